@@ -1,0 +1,2 @@
+from ._base import AbstractPhaseFunction as AbstractPhaseFunction
+from .isotropic import Isotropic as Isotropic

@@ -1,0 +1,48 @@
+"""The physical quantities of atmos, each with its unit, each named once.
+
+Lengths are metres, wavelengths nanometres, angles radians. Spectral quantities put the
+wavelength axis `wl` last; `#wl` may be 1 where the wavelength makes no difference.
+"""
+
+import math
+from typing import TypeAlias
+
+import jax.numpy as jnp
+from jaxtyping import Array, ArrayLike, Float
+
+
+Number: TypeAlias = Float[Array, ""]  # 1
+Length: TypeAlias = Float[Array, ""]  # m
+Angle: TypeAlias = Float[Array, ""]  # rad
+Cosine: TypeAlias = Float[Array, ""]  # 1
+Versine: TypeAlias = Float[Array, ""]  # 1, one minus the cosine
+Position: TypeAlias = Float[Array, "3"]  # m, origin on the ground, z up
+Direction: TypeAlias = Float[Array, "3"]  # 1, unit length
+Wavelength: TypeAlias = Float[Array, "wl"]  # nm
+Spectral: TypeAlias = Float[Array, "#wl"]  # a function of wavelength, unit by context
+PhaseValue: TypeAlias = Float[Array, "#wl"]  # sr^-1
+Fraction: TypeAlias = Float[Array, "wl"]  # 1
+Depth: TypeAlias = Float[Array, "wl"]  # 1, optical depth
+Irradiance: TypeAlias = Float[Array, "wl"]  # W m^-2 nm^-1
+Radiance: TypeAlias = Float[Array, "wl"]  # W m^-2 sr^-1 nm^-1
+
+m = 1.0
+km = 1000.0 * m
+nm = 1.0
+deg = math.pi / 180.0
+
+
+def as_float(x: ArrayLike) -> Array:
+    """The converter of every field that one might fit: always a floating array."""
+    x = jnp.asarray(x)
+    return x.astype(x.dtype if jnp.issubdtype(x.dtype, jnp.floating) else float)
+
+
+def versine(a: Direction, b: Direction) -> Versine:
+    """One minus the cosine of the angle between two directions.
+
+    Half the squared chord: it keeps its digits at small angles, where the cosine of a
+    single-precision number is 1 all over the solar disk.
+    """
+    apart = a - b
+    return 0.5 * jnp.dot(apart, apart)
