@@ -124,6 +124,11 @@ class Product(AbstractSpectrum):
     def evaluate(self, wavelength: Wavelength) -> Spectral:
         return self.one.evaluate(wavelength) * self.other.evaluate(wavelength)
 
+    @property
+    def domain(self) -> tuple[float, float]:
+        (low, high), (other_low, other_high) = self.one.domain, self.other.domain
+        return max(low, other_low), min(high, other_high)
+
 
 class Complement(AbstractSpectrum):
     """One minus a spectrum: what is absorbed of what is not scattered."""
@@ -132,6 +137,10 @@ class Complement(AbstractSpectrum):
 
     def evaluate(self, wavelength: Wavelength) -> Spectral:
         return 1.0 - self.of.evaluate(wavelength)
+
+    @property
+    def domain(self) -> tuple[float, float]:
+        return self.of.domain
 
 
 def as_spectrum(x: ArrayLike | AbstractSpectrum) -> AbstractSpectrum:

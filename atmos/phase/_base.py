@@ -10,13 +10,13 @@ class AbstractPhaseFunction(eqx.Module):
     """How light that scatters is spread over directions.
 
     The angle of scattering is given by its versine, one minus its cosine: 0 when light
-    goes straight on, 2 when it turns back. Narrow forward peaks need the digits that the
-    cosine would lose. The integral over the sphere is 1.
+    goes straight on, 2 when it turns back. Narrow forward peaks need the digits that
+    the cosine would lose. The integral over the sphere is 1.
     """
 
     @abc.abstractmethod
     def evaluate(self, versine: Versine, wavelength: Wavelength) -> PhaseValue:
-        """The fraction scattered per steradian; of length 1 if alike at all wavelengths."""
+        """The fraction scattered per steradian; of length 1 if alike at all of them."""
 
     @abc.abstractmethod
     def sample(self, key: PRNGKeyArray, wavelength: Wavelength) -> Versine:

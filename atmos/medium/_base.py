@@ -1,0 +1,101 @@
+import abc
+import math
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, ArrayLike, Float
+
+from ..geometry import AbstractPath, Point
+from ..phase import AbstractPhaseFunction, Isotropic
+from ..quantity import Length, Number, Spectral, Wavelength
+from ..spectrum import AbstractSpectrum, as_spectrum, Complement, Product
+
+
+class AbstractProfile(eqx.Module):
+    """How much of a medium there is at each place, relative to its coefficients."""
+
+    @abc.abstractmethod
+    def density(self, point: Point) -> Number:
+        """1 where the medium's coefficients hold as given."""
+
+    @property
+    @abc.abstractmethod
+    def levels(self) -> Float[Array, "n"]:
+        """The altitudes, rising, at which the density is not smooth; empty if none."""
+
+    @abc.abstractmethod
+    def breaks(self, path: AbstractPath) -> Float[Array, "n"]:
+        """The distances along a ray, rising, between which the density is smooth.
+
+        Where it depends on altitude they include the lowest place of the ray, so that
+        between two breaks the ray rises or falls. Numbers outside the ray do no harm.
+        """
+
+
+def crossings(
+    path: AbstractPath, altitudes: Float[Array, "n"]
+) -> Float[Array, "2*n+1"]:
+    """The breaks of a profile that is not smooth at these rising altitudes."""
+    falling, rising = jax.vmap(path.crossings, out_axes=1)(altitudes)
+    lowest = path.lowest()
+    # On a ray that never falls, or never rises, the lowest place is out of their order.
+    return jnp.concatenate(
+        [
+            jnp.minimum(falling[::-1], lowest),
+            lowest[None],
+            jnp.maximum(rising, lowest),
+        ]
+    )
+
+
+def _maybe(x: ArrayLike | AbstractSpectrum | None) -> AbstractSpectrum | None:
+    return None if x is None else as_spectrum(x)
+
+
+class Medium(eqx.Module):
+    """One kind of stuff in the air. A scene holds several; their effects add.
+
+    `scattering` and `absorption` are coefficients in m^-1 where `profile` is 1. A medium
+    that only absorbs has no `scattering`: solvers then do not look for its light.
+    """
+
+    profile: AbstractProfile
+    scattering: AbstractSpectrum | None = eqx.field(converter=_maybe, default=None)
+    absorption: AbstractSpectrum = eqx.field(converter=as_spectrum, default=0.0)
+    phase: AbstractPhaseFunction = Isotropic()
+
+    def extinction(self, wavelength: Wavelength) -> Spectral:
+        """What one metre takes out of a beam where the profile is 1, in m^-1."""
+        absorption = self.absorption.evaluate(wavelength)
+        if self.scattering is None:
+            return absorption
+        return absorption + self.scattering.evaluate(wavelength)
+
+
+def of_extinction(
+    extinction: AbstractSpectrum,
+    single_scattering_albedo: AbstractSpectrum,
+    profile: AbstractProfile,
+    phase: AbstractPhaseFunction,
+) -> Medium:
+    """A medium given by its extinction, in m^-1, and the share of it that scatters."""
+    return Medium(
+        profile,
+        scattering=Product(extinction, single_scattering_albedo),
+        absorption=Product(extinction, Complement(single_scattering_albedo)),
+        phase=phase,
+    )
+
+
+def check_above_zero(name: str, value: Array) -> None:
+    """Refuses a number that is not finite and above 0, with `ValueError`."""
+    if not isinstance(value, jax.core.Tracer) and not 0.0 < value < math.inf:
+        raise ValueError(f"`{name}` must be above 0 and finite; got {value}.")
+
+
+def check_not_negative(name: str, values: Array) -> None:
+    """Refuses an array with a number below 0 or not finite, with `ValueError`."""
+    if not isinstance(values, jax.core.Tracer):
+        if not bool(jnp.all(jnp.isfinite(values) & (values >= 0.0))):
+            raise ValueError(f"`{name}` must be 0 or above and finite; got {values}.")

@@ -1,0 +1,6 @@
+from ._base import (
+    AbstractSolver as AbstractSolver,
+    solve as solve,
+    SolvedSky as SolvedSky,
+)
+from .single_scattering import SingleScattering as SingleScattering

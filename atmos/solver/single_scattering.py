@@ -1,0 +1,150 @@
+import math
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float
+
+from ..geometry import AbstractPath, Point
+from ..light import Sun
+from ..quantity import Direction, Length, Position, Spectral, Wavelength
+from ..scene import Scene
+from ..transport import columns, cumulative, enter, extinctions, gauss_legendre
+from ._base import AbstractSolver
+
+
+# Light from beyond this optical depth is lost: it is 1e-13 of what comes from nearer.
+_OPAQUE = 30.0
+
+
+class SingleScattering(AbstractSolver):
+    """Light that turned once on its way, in the air or on the ground.
+
+    A ray is cut where a medium, or the light that falls on it, is not smooth: at edges of
+    media, and where the sun's rays have grazed the planet or such an edge. Each piece takes
+    `nodes` places by Gauss and Legendre, and so does each piece of the way from there to
+    the sun with `light_nodes`. Of more than `pieces`, neighbours are joined.
+    """
+
+    nodes: int = eqx.field(static=True, default=8)
+    light_nodes: int = eqx.field(static=True, default=8)
+    pieces: int = eqx.field(static=True, default=24)
+
+    def prepare(self, scene: Scene, wavelength: Wavelength) -> None:
+        return None
+
+    def scattered(
+        self,
+        prepared: None,
+        scene: Scene,
+        light: Sun,
+        wavelength: Wavelength,
+        position: Position,
+        direction: Direction,
+    ) -> Float[Array, "part wl"]:
+        del prepared
+        path, far, grounded = enter(scene, position, direction)
+        extinction = extinctions(scene, wavelength)
+        to_light = lambda point: self._to_light(scene, light, point)
+        irradiance = light.irradiance.evaluate(wavelength)
+
+        seen = self._seen(scene, path, far, extinction)
+        begin, length, lit = self._cut(scene, light, path, seen)
+        u, w = (jnp.asarray(x, far.dtype) for x in gauss_legendre(self.nodes))
+        # Crowd the places at both ends of a piece: one is thicker, the other nearer.
+        places = begin[:, None] + length[:, None] * (u * u * (3.0 - 2.0 * u))[None]
+        slope = length[:, None] * (6.0 * u * (1.0 - u))[None]
+        points = jax.vmap(jax.vmap(path.at))(places)
+
+        def profiles(point):
+            found = [x.profile.density(point) for x in scene.media]
+            return jnp.stack(found) if found else jnp.zeros(0, far.dtype)
+
+        steps = jax.vmap(jax.vmap(profiles))(points) * slope[..., None]
+        within = _sum(
+            "ij,pjm->pim", jnp.asarray(cumulative(self.nodes), far.dtype), steps
+        )
+        whole = _sum("j,pjm->pm", w, steps)
+        before = jnp.cumsum(whole, 0) - whole
+        passed = before[:, None] + within + jax.vmap(jax.vmap(to_light))(points)
+        arrives = jnp.exp(-_sum("pim,ml->pil", passed, extinction))
+        steps = jnp.where(lit[:, None, None], steps * w[:, None], 0.0)
+        gathered = _sum("pim,pil->ml", steps, arrives)
+        air = [
+            x.scattering.evaluate(wavelength) * gathered[i] * irradiance
+            for i, x in enumerate(scene.media)
+            if x.scattering is not None
+        ]
+
+        foot = path.at(far)
+        foot = Point(foot.position, jnp.zeros_like(far), foot.up)
+        passed = jnp.sum(whole, 0) + to_light(foot)
+        arrives = jnp.exp(-_sum("m,ml->l", passed, extinction))
+        rise = jnp.maximum(jnp.dot(foot.up, light.direction), 0.0)
+        albedo = scene.ground.evaluate(wavelength)
+        ground = albedo / math.pi * rise * arrives * irradiance
+        return jnp.stack([*air, jnp.where(grounded, ground, 0.0)])
+
+    def _to_light(
+        self, scene: Scene, light: Sun, point: Point
+    ) -> Float[Array, "medium"]:
+        path = scene.geometry.path(point, light.direction)
+        return columns(scene, path, path.span(scene.top).far, nodes=self.light_nodes)
+
+    def _seen(
+        self,
+        scene: Scene,
+        path: AbstractPath,
+        far: Length,
+        extinction: Float[Array, "medium wl"],
+    ) -> Length:
+        """How far one sees: to `far`, or somewhat past where the clearest light is lost."""
+        fixed, whole, extinction = jax.lax.stop_gradient((path, far, extinction))
+
+        def opaque(halvings):
+            found = columns(scene, fixed, whole * jnp.exp2(-halvings), nodes=4)
+            depth = _sum("m,ml->l", jax.lax.stop_gradient(found), extinction)
+            return jnp.min(depth, initial=math.inf) > _OPAQUE
+
+        def closer(_, bounds):
+            yes, no = bounds
+            middle = 0.5 * (yes + no)
+            found = opaque(middle)
+            return jnp.where(found, middle, yes), jnp.where(found, no, middle)
+
+        start = jnp.zeros_like(whole), jnp.full_like(whole, 40.0)
+        halvings, _ = jax.lax.fori_loop(0, 7, closer, start)
+        return far * jnp.exp2(-halvings)
+
+    def _cut(
+        self, scene: Scene, light: Sun, path: AbstractPath, seen: Length
+    ) -> tuple[Float[Array, "piece"], Float[Array, "piece"], Bool[Array, "piece"]]:
+        """Where the pieces of a ray begin, their lengths, and which lie in the light."""
+        graze = lambda altitude: path.shadow(light.direction, altitude)
+        # Close by, the light of a thick medium changes faster than the medium itself.
+        edges = [seen * jnp.array([0.0, 0.0625, 0.25, 1.0], seen.dtype)]
+        for x in scene.media:
+            edges += [x.profile.breaks(path), jax.vmap(graze)(x.profile.levels).ravel()]
+        edges = jnp.sort(jnp.clip(jnp.concatenate(edges), 0.0, seen))
+        edges = _join(edges, self.pieces)
+        dark = jnp.clip(graze(jnp.zeros_like(seen)), 0.0, seen)
+        edges = jnp.sort(jnp.concatenate([edges, dark]))
+        middle = 0.5 * (edges[1:] + edges[:-1])
+        return edges[:-1], jnp.diff(edges), (middle < dark[0]) | (middle > dark[1])
+
+
+def _join(edges: Float[Array, "edge"], pieces: int) -> Float[Array, "cut"]:
+    """All edges that differ, if they make no more than `pieces`; else one in so many."""
+    differs = jnp.diff(edges) > 1e-6 * edges[-1]
+    rank = jnp.concatenate(
+        [jnp.zeros_like(edges[:1]), jnp.cumsum(differs.astype(edges.dtype))]
+    )
+    wanted = jnp.arange(pieces + 1, dtype=edges.dtype) * jnp.maximum(
+        rank[-1] / pieces, 1.0
+    )
+    late = rank[None, :] >= wanted[:, None] - 0.5
+    return jnp.min(jnp.where(late, edges[None, :], edges[-1]), 1)
+
+
+def _sum(product: str, *terms: Array) -> Array:
+    return jnp.einsum(product, *terms, precision="highest")
