@@ -1,0 +1,21 @@
+"""A physically based spectral sky."""
+
+from . import (
+    camera as camera,
+    colour as colour,
+    geometry as geometry,
+    image as image,
+    light as light,
+    medium as medium,
+    particle as particle,
+    phase as phase,
+    sky as sky,
+    solver as solver,
+    spectrum as spectrum,
+    transport as transport,
+)
+from .disk import render_disks as render_disks
+from .quantity import deg as deg, km as km, m as m, nm as nm
+from .render import render as render
+from .scene import earth as earth, mars as mars, Scene as Scene
+from .solver import solve as solve

@@ -150,9 +150,10 @@ class Spherical(AbstractGeometry):
         x, y, z = position
         from_centre = position.at[2].add(self.radius)
         distance = jnp.sqrt(x * x + y * y + from_centre[2] * from_centre[2])
-        # |p - c| - radius, without the cancellation.
-        altitude = (x * x + y * y + z * (z + 2.0 * self.radius)) / (
-            distance + self.radius
+        # |p - c| - radius, without the cancellation, and z itself above the origin.
+        w = from_centre[2]
+        altitude = jnp.where(w >= 0.0, z, -z - 2.0 * self.radius) + (x * x + y * y) / (
+            distance + jnp.abs(w)
         )
         return Point(position, altitude, from_centre / distance)
 

@@ -18,7 +18,8 @@ from .quantity import (
     versine,
     Wavelength,
 )
-from .spectrum import AbstractSpectrum, as_spectrum
+from .reference import solar_irradiance
+from .spectrum import AbstractSpectrum, as_spectrum, BandAverage
 
 
 SOLAR_RADIUS = 0.26656 * deg  # 959.63 arcseconds, seen from 1 astronomical unit
@@ -156,6 +157,16 @@ def _mean(coefficients: Float[Array, "6 wl"]) -> Float[Array, "wl"]:
     """The mean brightness of the disk, relative to its centre."""
     weights = jnp.asarray(2.0 / (_POWERS + 2.0), coefficients.dtype)
     return jnp.sum(coefficients * weights[:, None], 0)
+
+
+def sunlight(bandwidth: ArrayLike = 10.0, distance: ArrayLike = 1.0) -> BandAverage:
+    """The sun's spectrum outside the air, in W m^-2 nm^-1 (ASTM G173-03).
+
+    Averaged over bands of `bandwidth` nm, at a `distance` in astronomical units: 1.524 is
+    that of Mars.
+    """
+    wavelength, irradiance = solar_irradiance()
+    return BandAverage(wavelength, irradiance / as_float(distance) ** 2, bandwidth)
 
 
 def ephemeris(

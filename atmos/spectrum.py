@@ -4,9 +4,9 @@ import abc
 import math
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.core import Tracer
 from jaxtyping import Array, ArrayLike, Float
 
 from .quantity import as_float, Number, Spectral, Wavelength
@@ -90,7 +90,7 @@ class BandAverage(AbstractSpectrum):
 
     def __check_init__(self):
         check_table("knots", self.knots, "values", self.values)
-        if not (isinstance(self.bandwidth, jax.core.Tracer) or self.bandwidth > 0.0):
+        if not (isinstance(self.bandwidth, Tracer) or self.bandwidth > 0.0):
             raise ValueError(f"`bandwidth` must be above 0 nm; got {self.bandwidth}.")
 
     def evaluate(self, wavelength: Wavelength) -> Spectral:
@@ -159,7 +159,7 @@ def check_table(key: str, knots: Array, name: str, values: Array) -> None:
             f"`{name}` must pair with two or more `{key}`; got shapes "
             f"{values.shape} and {knots.shape}."
         )
-    if isinstance(knots, jax.core.Tracer) or isinstance(values, jax.core.Tracer):
+    if isinstance(knots, Tracer) or isinstance(values, Tracer):
         return
     if not (np.all(np.isfinite(knots)) and np.all(np.diff(knots) > 0.0)):
         raise ValueError(f"`{key}` must be finite and rise; got {np.asarray(knots)}.")

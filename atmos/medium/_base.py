@@ -4,6 +4,7 @@ import math
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+from jax.core import Tracer
 from jaxtyping import Array, ArrayLike, Float
 
 from ..geometry import AbstractPath, Point
@@ -90,12 +91,12 @@ def of_extinction(
 
 def check_above_zero(name: str, value: Array) -> None:
     """Refuses a number that is not finite and above 0, with `ValueError`."""
-    if not isinstance(value, jax.core.Tracer) and not 0.0 < value < math.inf:
+    if not isinstance(value, Tracer) and not 0.0 < value < math.inf:
         raise ValueError(f"`{name}` must be above 0 and finite; got {value}.")
 
 
 def check_not_negative(name: str, values: Array) -> None:
     """Refuses an array with a number below 0 or not finite, with `ValueError`."""
-    if not isinstance(values, jax.core.Tracer):
+    if not isinstance(values, Tracer):
         if not bool(jnp.all(jnp.isfinite(values) & (values >= 0.0))):
             raise ValueError(f"`{name}` must be 0 or above and finite; got {values}.")

@@ -1,9 +1,10 @@
 import abc
 
 import equinox as eqx
+import jax.numpy as jnp
 from jaxtyping import Array, Float, PRNGKeyArray
 
-from ..quantity import PhaseValue, Versine, Wavelength
+from ..quantity import PhaseValue, Spectral, Versine, Wavelength
 
 
 class AbstractPhaseFunction(eqx.Module):
@@ -29,3 +30,13 @@ class AbstractPhaseFunction(eqx.Module):
         The l-th is the mean of the Legendre polynomial P_l of the cosine, without the
         factor 2l + 1.
         """
+
+    def terms(
+        self, wavelength: Wavelength
+    ) -> "tuple[tuple[AbstractPhaseFunction, Spectral], ...]":
+        """Phase functions that make up this one, and the weight of each.
+
+        Where a function changes with the wavelength, and yet is a mixture of some that do
+        not, pictures are quicker to make of those.
+        """
+        return ((self, jnp.ones_like(wavelength[:1])),)

@@ -3,10 +3,11 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, PRNGKeyArray
 
-from ..quantity import PhaseValue, Versine, Wavelength
+from ..quantity import PhaseValue, Spectral, Versine, Wavelength
 from ..spectrum import AbstractSpectrum, as_spectrum
 from ._base import AbstractPhaseFunction
 from ._check import check_between
+from .isotropic import Isotropic
 
 
 class Rayleigh(AbstractPhaseFunction):
@@ -48,3 +49,10 @@ class Rayleigh(AbstractPhaseFunction):
         second = 0.2 * (1.0 - rho) / (2.0 + rho)
         moments = jnp.zeros((count, *rho.shape), rho.dtype).at[0].set(1.0)
         return moments.at[2:3].set(second) if count > 2 else moments
+
+    def terms(
+        self, wavelength: Wavelength
+    ) -> tuple[tuple[AbstractPhaseFunction, Spectral], ...]:
+        rho = self.depolarisation.evaluate(wavelength)
+        pure = 2.0 * (1.0 - rho) / (2.0 + rho)
+        return (Rayleigh(jnp.zeros_like(rho[0])), pure), (Isotropic(), 1.0 - pure)

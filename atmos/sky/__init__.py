@@ -1,2 +1,8 @@
 from ._base import AbstractSky as AbstractSky
-from .panorama import Grid as Grid, Panorama as Panorama
+from .panorama import (
+    COARSE as COARSE,
+    FINE as FINE,
+    Grid as Grid,
+    Panorama as Panorama,
+    Resolution as Resolution,
+)

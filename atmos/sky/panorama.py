@@ -1,6 +1,7 @@
 """A sky as seen from one place: a table that is quick to look up."""
 
 import math
+from collections.abc import Callable
 
 import equinox as eqx
 import jax
@@ -16,53 +17,70 @@ _SLIVER = 1e-5
 _FINER = 4
 
 
+class Resolution(eqx.Module):
+    """How many rings a grid has above and below the horizon, and azimuths around half."""
+
+    above: int = eqx.field(static=True)
+    below: int = eqx.field(static=True)
+    around: int = eqx.field(static=True)
+
+
+COARSE = Resolution(48, 32, 25)
+FINE = Resolution(128, 96, 65)
+
+
 class Grid(eqx.Module):
     """Directions: rings of equal zenith angle, and azimuths on them.
 
-    Rings crowd at the horizon from both sides. Azimuths run from that of the light to
+    Rings crowd at the horizon from both sides, and at the edge of the air if that is seen
+    from outside. Azimuths run from that of the light to
     the opposite one: the other half of the sky is alike.
     """
 
     first: Angle  # the highest ring: what is above it is black
     horizon: Angle
-    above: int = eqx.field(static=True)
-    below: int = eqx.field(static=True)
-    around: int = eqx.field(static=True)
+    resolution: Resolution
 
     def zeniths(self) -> Float[Array, "ring"]:
         """The zenith angle of each ring, from the highest to the lowest."""
         dtype = self.horizon.dtype
-        up = jnp.linspace(1.0, 0.0, self.above, dtype=dtype)
-        down = jnp.linspace(0.0, 1.0, self.below, dtype=dtype)
+        up = jnp.linspace(1.0, 0.0, self.resolution.above, dtype=dtype) ** 3
+        up = jnp.where(self.first > 0.0, up * (2.0 - up), up)
+        down = jnp.linspace(0.0, 1.0, self.resolution.below, dtype=dtype) ** 3
         top, bottom = self.horizon - _SLIVER, self.horizon + _SLIVER
         return jnp.concatenate(
-            [top - (top - self.first) * up**3, bottom + (math.pi - bottom) * down**3]
+            [top - (top - self.first) * up, bottom + (math.pi - bottom) * down]
         )
 
     def azimuths(self) -> Float[Array, "around"]:
         """The azimuths on each ring, relative to that of the light."""
-        return jnp.linspace(0.0, math.pi, self.around, dtype=self.horizon.dtype)
+        return jnp.linspace(
+            0.0, math.pi, self.resolution.around, dtype=self.horizon.dtype
+        )
 
     def ring(self, zenith: Float[Array, "*n"]) -> Float[Array, "*n"]:
         """Where a zenith angle lies among the rings, counted from 0."""
         top, bottom = self.horizon - _SLIVER, self.horizon + _SLIVER
-        up = _cube_root((top - zenith) / (top - self.first))
-        down = _cube_root((zenith - bottom) / (math.pi - bottom))
+        up = (top - zenith) / jnp.maximum(top - self.first, _SLIVER)
+        rest = jnp.maximum(1.0 - up, 0.0)
+        up = jnp.where(self.first > 0.0, up / (1.0 + _root(rest, jnp.sqrt)), up)
+        up = _root(up, jnp.cbrt)
+        down = _root((zenith - bottom) / (math.pi - bottom), jnp.cbrt)
         return jnp.where(
             zenith > self.horizon,
-            self.above + down * (self.below - 1),
-            (1.0 - up) * (self.above - 1),
+            self.resolution.above + down * (self.resolution.below - 1),
+            (1.0 - up) * (self.resolution.above - 1),
         )
 
     def side(self, azimuth: Float[Array, "*n"]) -> Float[Array, "*n"]:
         """Where a relative azimuth lies on its ring, counted from 0."""
         turn = jnp.abs(jnp.remainder(azimuth + math.pi, 2.0 * math.pi) - math.pi)
-        return turn * ((self.around - 1) / math.pi)
+        return turn * ((self.resolution.around - 1) / math.pi)
 
 
-def _cube_root(x: Array) -> Array:
+def _root(x: Array, function: Callable[[Array], Array]) -> Array:
     inside = x > 1e-12
-    return jnp.where(inside, jnp.cbrt(jnp.where(inside, x, 1.0)), 0.0)
+    return jnp.where(inside, function(jnp.where(inside, x, 1.0)), 0.0)
 
 
 def _cubic(
@@ -97,74 +115,93 @@ class Panorama(eqx.Module):
     ) -> Float[Array, "height width wl"]:
         """The radiance from each direction of a picture, in W m^-2 sr^-1 nm^-1.
 
-        Angles in rad, azimuth clockwise from north. It is quickest where all pixels of a
-        row share their zenith angle and all of a column their azimuth.
+        Angles in rad, azimuth clockwise from north. Where the pixels of a row share their
+        zenith angle, and those of a column their azimuth, it lies on a cubic through the
+        directions of the grid; elsewhere on straight lines, for which see `finer`.
         """
         shape = jnp.broadcast_shapes(zenith.shape, azimuth.shape)
         total = jnp.zeros((*shape, *self.wavelength.shape), self.wavelength.dtype)
-        lights = zip(self.table, self.light_zenith, self.light_azimuth, strict=True)
-        for table, light_zenith, light_azimuth in lights:
-            relative = azimuth - light_azimuth
-            if zenith.shape[1] == 1 and azimuth.shape[0] == 1:
-                parts = self._rows(table, zenith[:, 0], relative[0])
-            else:
-                parts = self._pixels(table, zenith, relative)
-            black = (zenith < self.grid.first)[..., None]
-            total += jnp.where(
-                black, 0.0, self._join(parts, zenith, relative, light_zenith)
-            )
-        return total
-
-    def _rows(self, table, zenith, relative):
-        """Every azimuth on every ring asked for."""
-        grid = self.grid
-        at = grid.ring(zenith)
-        low = jnp.where(zenith > grid.horizon, float(grid.above), 0.0)
-        count = jnp.where(zenith > grid.horizon, float(grid.below), float(grid.above))
-        first, weights = _cubic(at, low, low + count - 1.0)
-        rings = sum(
-            weights[:, k, None, None, None] * table[first + k] for k in range(4)
-        )
-        rings = jnp.pad(rings, ((0, 0), (1, 1), (0, 0), (0, 0)), mode="reflect")
-        first, weights = _cubic(grid.side(relative) + 1.0, 0.0, grid.around + 1.0)
-        places = jnp.arange(grid.around + 2)
-        mixing = sum(
-            jnp.where(first[:, None] + k == places, weights[:, k, None], 0.0)
-            for k in range(4)
-        )
-        return jnp.einsum("wa,hapl->hwpl", mixing, rings, precision="highest")
-
-    def _pixels(self, table, zenith, relative):
-        """A straight line in a finer table, pixel by pixel."""
-        grid = self.grid
-        finer = Grid(
-            grid.first,
-            grid.horizon,
-            _FINER * (grid.above - 1) + 1,
-            _FINER * (grid.below - 1) + 1,
-            _FINER * (grid.around - 1) + 1,
-        )
-        table = self._rows(table, finer.zeniths(), finer.azimuths())
-        ring, side = jnp.broadcast_arrays(finer.ring(zenith), finer.side(relative))
-        low = jnp.where(zenith > grid.horizon, finer.above, 0)
-        high = jnp.where(zenith > grid.horizon, finer.above + finer.below, finer.above)
-        i = jnp.clip(jnp.floor(ring).astype(int), low, high - 2)
-        j = jnp.clip(jnp.floor(side).astype(int), 0, finer.around - 2)
-        s, t = (ring - i)[..., None, None], (side - j)[..., None, None]
-        here = (1.0 - t) * table[i, j] + t * table[i, j + 1]
-        return (1.0 - s) * here + s * (
-            (1.0 - t) * table[i + 1, j] + t * table[i + 1, j + 1]
-        )
-
-    def _join(self, parts, zenith, relative, light_zenith):
+        in_rows = zenith.shape[1] == 1 and azimuth.shape[0] == 1
+        look = self._rows if in_rows else self._pixels
+        for i in range(self.table.shape[0]):
+            relative = azimuth - self.light_azimuth[i]
+            turned = versine_between(zenith, self.light_zenith[i], relative)
+            total += look(self.table[i], zenith, relative, self._weights(turned))
         # Between a lit place and a dark one a cubic may swing below nothing.
-        parts = jnp.maximum(parts, 0.0)
-        turned = versine_between(zenith, light_zenith, relative)
-        total = parts[..., -1, :]
-        for i, phase in enumerate(self.phases):
-            look = jax.vmap(lambda v, p=phase: p.evaluate(v, self.wavelength))
-            total += jax.vmap(look)(turned) * parts[..., i, :]
+        visible = (zenith >= self.grid.first)[..., None]
+        return jnp.where(visible, jnp.maximum(total, 0.0), 0.0)
+
+    def _weights(self, turned):
+        """What each part of the table is to be multiplied by, pixel by pixel."""
+        look = lambda p: jax.vmap(jax.vmap(lambda v: p.evaluate(v, self.wavelength)))
+        return [*(look(x)(turned) for x in self.phases), jnp.ones((*turned.shape, 1))]
+
+    def _rings(self, table, zenith):
+        """The table at other zenith angles, with one more azimuth at each end."""
+        grid, size = self.grid, self.grid.resolution
+        grounded = zenith > grid.horizon
+        low = jnp.where(grounded, float(size.above), 0.0)
+        count = jnp.where(grounded, float(size.below), float(size.above))
+        first, weights = _cubic(grid.ring(zenith), low, low + count - 1.0)
+        weights = weights[:, :, None, None, None]
+        rings = sum(weights[:, k] * table[first + k] for k in range(4))
+        return jnp.pad(rings, ((0, 0), (1, 1), (0, 0), (0, 0)), mode="reflect")
+
+    def _mixing(self, relative):
+        """What each azimuth of such rings counts at other azimuths."""
+        count = self.grid.resolution.around + 2
+        first, weights = _cubic(self.grid.side(relative) + 1.0, 0.0, count - 1.0)
+        place = jnp.arange(count)[None, :] - first[:, None]
+        return sum(jnp.where(place == k, weights[:, k, None], 0.0) for k in range(4))
+
+    def _rows(self, table, zenith, relative, weights):
+        rings, mixing = self._rings(table, zenith[:, 0]), self._mixing(relative[0])
+        # Weights alike at all wavelengths go into the matrix that mixes azimuths.
+        even = [i for i, x in enumerate(weights) if x.shape[-1] == 1]
+        factor = jnp.concatenate([weights[i] for i in even], -1)
+        factor = factor[..., :, None] * mixing[None, :, None, :]
+        height, width, *_ = factor.shape
+        rows = jnp.moveaxis(rings[:, :, jnp.array(even)], 2, 1)
+        total = _product(
+            "hwk,hkl->hwl",
+            factor.reshape(height, width, -1),
+            rows.reshape(height, -1, rows.shape[-1]),
+        )
+        for i in set(range(len(weights))) - set(even):
+            total += weights[i] * _product("wa,hal->hwl", mixing, rings[:, :, i])
         return total
+
+    def _pixels(self, table, zenith, relative, weights):
+        grid, size = self.grid, self.grid.resolution
+        ring, side = jnp.broadcast_arrays(grid.ring(zenith), grid.side(relative))
+        grounded = zenith > grid.horizon
+        low = jnp.where(grounded, size.above, 0)
+        high = jnp.where(grounded, size.above + size.below, size.above)
+        i = jnp.clip(jnp.floor(ring).astype(int), low, high - 2)
+        j = jnp.clip(jnp.floor(side).astype(int), 0, size.around - 2)
+        s, t = (ring - i)[..., None, None], (side - j)[..., None, None]
+        upper = (1.0 - t) * table[i, j] + t * table[i, j + 1]
+        lower = (1.0 - t) * table[i + 1, j] + t * table[i + 1, j + 1]
+        parts = (1.0 - s) * upper + s * lower
+        return sum(x * parts[..., i, :] for i, x in enumerate(weights))
+
+    def finer(self) -> "Panorama":
+        """The same on a grid four times as fine: for pictures that are not in rows."""
+        size = self.grid.resolution
+        size = Resolution(
+            above=_FINER * (size.above - 1) + 1,
+            below=_FINER * (size.below - 1) + 1,
+            around=_FINER * (size.around - 1) + 1,
+        )
+        grid = Grid(self.grid.first, self.grid.horizon, size)
+        mixing = self._mixing(grid.azimuths())
+        rings = jax.vmap(lambda x: self._rings(x, grid.zeniths()))(self.table)
+        table = _product("wa,nhapl->nhwpl", mixing, rings)
+        return eqx.tree_at(lambda x: (x.grid, x.table), self, (grid, table))
+
+
+def _product(names: str, *terms: Array) -> Array:
+    return jnp.einsum(names, *terms, precision="highest")
 
 
 def versine_between(

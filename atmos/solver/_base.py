@@ -1,15 +1,19 @@
 import abc
+import math
 from typing import Any
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.core import Tracer
 from jaxtyping import Array, ArrayLike, Float, PyTree
 
 from ..light import Sun
+from ..phase import Isotropic
 from ..quantity import (
     as_float,
+    deg,
     Direction,
     Position,
     Radiance,
@@ -17,7 +21,7 @@ from ..quantity import (
     Wavelength,
 )
 from ..scene import Scene
-from ..sky import AbstractSky, Grid, Panorama
+from ..sky import AbstractSky, COARSE, FINE, Grid, Panorama, Resolution
 
 
 class AbstractSolver(eqx.Module):
@@ -63,54 +67,28 @@ class SolvedSky(AbstractSky):
             total += parts[-1]
         return total
 
-    def panorama(
-        self, position: Position, *, above: int = 64, below: int = 48, around: int = 33
-    ) -> Panorama:
-        """All that one sees from `position`, on a grid of that many directions.
+    def panorama(self, position: Position) -> Panorama:
+        """All that one sees from `position`, made ready for millions of looks.
 
-        `above` and `below` count rings over and under the horizon, `around` azimuths on
-        half a ring. Zenith angles and azimuths are those at the origin, so the place must
-        lie straight above it: raises `ValueError` otherwise.
+        Its zenith angles and azimuths are those at the origin, so the place must lie
+        straight above it: raises `ValueError` otherwise.
         """
-        if not isinstance(position, jax.core.Tracer) and np.any(
-            np.asarray(position)[:2] != 0.0
-        ):
+        if isinstance(position, Tracer):
+            return _tabulate(self, position, FINE)
+        aside = np.asarray(position)[:2]
+        if np.any(aside != 0.0):
             raise ValueError(
                 f"`position` must lie straight above the origin; got {position}."
             )
-        altitude = position[2]
-        below_level, first = self._edges(altitude)
-        grid = Grid(first, 0.5 * jnp.pi + below_level, above, below, around)
-        zeniths, azimuths = grid.zeniths(), grid.azimuths()
+        return _tabulate(self, position, self._resolution(position))
 
-        def ring(light, zenith):
-            east, north = light.horizontal
-
-            def look(azimuth):
-                ahead, aside = jnp.cos(azimuth), jnp.sin(azimuth)
-                level = jnp.stack(
-                    [east * ahead + north * aside, north * ahead - east * aside]
-                )
-                direction = jnp.concatenate(
-                    [jnp.sin(zenith) * level, jnp.cos(zenith)[None]]
-                )
-                return self._parts(light, position, direction)
-
-            return jax.vmap(look)(azimuths)
-
-        tables = [
-            jax.lax.map(lambda z, x=light: ring(x, z), zeniths, batch_size=16)
-            for light in self.scene.lights
-        ]
-        parts = len(self.scene.scattering_media) + 1
-        shape = (0, above + below, around, parts, *self.wavelength.shape)
-        return Panorama(
-            grid=grid,
-            table=jnp.stack(tables) if tables else jnp.zeros(shape, altitude.dtype),
-            light_zenith=_stack([x.zenith for x in self.scene.lights], altitude),
-            light_azimuth=_stack([x.azimuth for x in self.scene.lights], altitude),
-            phases=tuple(x.phase for x in self.scene.scattering_media),
-            wavelength=self.wavelength,
+    def _resolution(self, position: Position) -> Resolution:
+        """Few directions by day; more where night falls within sight."""
+        dip, _ = self._edges(position[2])
+        zeniths = [float(x.zenith + dip) for x in self.scene.lights]
+        chosen = FINE if max(zeniths, default=0.0) > 80.0 * deg else COARSE
+        return (
+            Resolution(chosen.above, 12, chosen.around) if position[2] < 100 else chosen
         )
 
     def _edges(self, altitude):
@@ -121,14 +99,56 @@ class SolvedSky(AbstractSky):
         first = jnp.where(outside, 0.5 * jnp.pi + limb, 0.0)
         return geometry.dip(altitude, jnp.zeros_like(top)), first
 
-    def _parts(self, light, position, direction):
+    def _parts(
+        self, light: Sun, position: Position, direction: Direction
+    ) -> Float[Array, "part wl"]:
         return self.solver.scattered(
             self.prepared, self.scene, light, self.wavelength, position, direction
         )
 
 
-def _stack(numbers, like):
-    return jnp.stack(numbers) if numbers else jnp.zeros(0, like.dtype)
+@eqx.filter_jit
+def _tabulate(sky: SolvedSky, position: Position, resolution: Resolution) -> Panorama:
+    """The sky on a grid of directions, one light after the other."""
+    dip, first = sky._edges(position[2])
+    grid = Grid(first, 0.5 * math.pi + dip, resolution)
+    lights, media = sky.scene.lights, sky.scene.scattering_media
+    terms = [x.phase.terms(sky.wavelength) for x in media]
+
+    def look(light, zenith, azimuth):
+        ahead, aside = jnp.cos(azimuth), jnp.sin(azimuth)
+        east, north = light.horizontal
+        level = [east * ahead + north * aside, north * ahead - east * aside]
+        up, flat = jnp.cos(zenith), jnp.sin(zenith)
+        direction = jnp.stack([flat * level[0], flat * level[1], up])
+        *air, rest = sky._parts(light, position, direction)
+        parts = []
+        for part, mixture in zip(air, terms, strict=True):
+            for phase, weight in mixture:
+                if isinstance(phase, Isotropic):
+                    rest += weight * part * (0.25 / math.pi)
+                else:
+                    parts.append(weight * part)
+        return jnp.stack([*parts, rest])
+
+    def table(light):
+        ring = jax.vmap(look, (None, None, 0))
+        rings = lambda zenith: ring(light, zenith, grid.azimuths())
+        return jax.lax.map(rings, grid.zeniths(), batch_size=4)
+
+    phases = [
+        x for mixture in terms for x, _ in mixture if not isinstance(x, Isotropic)
+    ]
+    shape = (0, resolution.above + resolution.below, resolution.around)
+    none = jnp.zeros((*shape, len(phases) + 1, *sky.wavelength.shape), dip.dtype)
+    return Panorama(
+        grid=grid,
+        table=jnp.stack([table(x) for x in lights]) if lights else none,
+        light_zenith=jnp.array([x.zenith for x in lights], dip.dtype),
+        light_azimuth=jnp.array([x.azimuth for x in lights], dip.dtype),
+        phases=tuple(phases),
+        wavelength=sky.wavelength,
+    )
 
 
 def solve(scene: Scene, solver: AbstractSolver, wavelength: ArrayLike) -> SolvedSky:
@@ -143,7 +163,7 @@ def solve(scene: Scene, solver: AbstractSolver, wavelength: ArrayLike) -> Solved
         raise ValueError(
             f"`wavelength` must be one-dimensional; got shape {wavelength.shape}."
         )
-    if isinstance(wavelength, jax.core.Tracer):
+    if isinstance(wavelength, Tracer):
         wavelength = eqx.error_if(
             wavelength,
             ~jnp.all((wavelength >= 100.0) & (wavelength <= 1e5)),
@@ -170,9 +190,7 @@ def _check_wavelength(scene: Scene, wavelength: np.ndarray) -> None:
         return
     known = lambda x: hasattr(x, "domain")
     for path, leaf in jax.tree_util.tree_leaves_with_path(scene, is_leaf=known):
-        if not known(leaf) or any(
-            isinstance(x, jax.core.Tracer) for x in jax.tree.leaves(leaf)
-        ):
+        if not known(leaf) or any(isinstance(x, Tracer) for x in jax.tree.leaves(leaf)):
             continue
         low, high = leaf.domain
         if wavelength.min() < low or wavelength.max() > high:

@@ -28,7 +28,7 @@ class SingleScattering(AbstractSolver):
 
     nodes: int = eqx.field(static=True, default=8)
     light_nodes: int = eqx.field(static=True, default=8)
-    pieces: int = eqx.field(static=True, default=24)
+    pieces: int = eqx.field(static=True, default=28)
 
     def prepare(self, scene: Scene, wavelength: Wavelength) -> None:
         return None

@@ -1,0 +1,135 @@
+"""The disks of lights in a picture, with all their energy at any number of pixels."""
+
+import math
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from .camera import AbstractCamera
+from .light import Sun
+from .render import Response
+from .solver import SolvedSky
+from .transport import optical_depth
+
+
+_ACROSS = 64  # samples across a disk, at least
+_STRIPS = 33  # zenith angles at which the air in front of a disk is known
+_TOGETHER = 2**14  # samples that are worked on together
+
+
+def render_disks(
+    sky: SolvedSky, camera: AbstractCamera, response: Response | None = None
+) -> Float[np.ndarray, "height width channel"]:
+    """The disks of the lights alone, through the air: to be added to `render`'s picture.
+
+    Each pixel is the mean over its area, so that the picture holds a light's irradiance
+    however coarse it is. Shape and unit are those of `render`.
+    """
+    dtype = sky.wavelength.dtype
+    camera = jax.tree.map(lambda x: x.astype(dtype), camera)
+    count = sky.wavelength.size
+    response = jnp.eye(count, dtype=dtype) if response is None else response
+    image = np.zeros((camera.height, camera.width, response.shape[1]), dtype)
+    extent = _extent(camera)
+    for light in sky.scene.lights:
+        radius = float(light.angular_radius)
+        if radius <= 0.0:
+            continue
+        rows, columns = _near(camera, light, radius + extent)
+        finest = math.ceil(math.log2(max(1.0, extent * _ACROSS / radius)))
+        samples = 2 ** min(finest, 6)
+        together = _TOGETHER // samples**2
+        depths = _depths(sky, camera, light)
+        for i in range(0, rows.size, together):
+            part = slice(i, i + together)
+            pixels = np.stack([columns[part], rows[part]], -1).astype(dtype)
+            filled = np.pad(pixels, ((0, together - len(pixels)), (0, 0)), mode="edge")
+            seen = _pixels(sky, camera, light, depths, filled, response, samples)
+            image[rows[part], columns[part]] += np.asarray(seen)[: len(pixels)]
+    return image
+
+
+def _near(
+    camera: AbstractCamera, light: Sun, reach: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """The rows and columns of the pixels whose centres lie within reach of a light."""
+    zenith, azimuth = (np.asarray(x) for x in camera.angles())
+    apart = np.sin(0.5 * (zenith - np.asarray(light.zenith)))
+    aside = np.sin(0.5 * (azimuth - np.asarray(light.azimuth)))
+    level = np.sin(zenith) * np.sin(np.asarray(light.zenith))
+    near = apart * apart + level * aside * aside <= (0.5 * reach) ** 2
+    return np.nonzero(near & np.asarray(camera.sees()))
+
+
+def _extent(camera: AbstractCamera) -> float:
+    """The angle from the centre of a pixel to a corner: the largest, or somewhat more."""
+    steps = jnp.linspace(0.5, 8.5, 9, dtype=camera.position.dtype) / 9.0
+    y, x = (
+        z.ravel() for z in jnp.meshgrid(steps * camera.height, steps * camera.width)
+    )
+    centre = jax.vmap(camera.direction)(x, y)
+    corners = [jax.vmap(camera.direction)(x + 0.5, y + dy) for dy in (-0.5, 0.5)]
+    chords = [jnp.sqrt(jnp.sum((corner - centre) ** 2, -1)) for corner in corners]
+    return 1.2 * float(jnp.max(jnp.stack(chords)))
+
+
+def _strips(sky: SolvedSky, camera: AbstractCamera, light: Sun):
+    """The zenith angles of the upper and the lower limb, and that of the horizon."""
+    altitude = camera.position[2]
+    dip = sky.scene.geometry.dip(altitude, jnp.zeros_like(altitude))
+    radius = light.angular_radius
+    return light.zenith - radius, light.zenith + radius, 0.5 * math.pi + dip
+
+
+@eqx.filter_jit
+def _depths(
+    sky: SolvedSky, camera: AbstractCamera, light: Sun
+) -> Float[Array, "strip wl"]:
+    """The optical depth in front of a disk, strip by strip downwards."""
+    top, bottom, horizon = _strips(sky, camera, light)
+    east, north = light.horizontal
+
+    def strip(zenith):
+        level = jnp.sin(zenith)
+        direction = jnp.stack([level * east, level * north, jnp.cos(zenith)])
+        return optical_depth(sky.scene, camera.position, direction, sky.wavelength)
+
+    zeniths = jnp.linspace(top, bottom, _STRIPS, dtype=top.dtype)
+    return jax.vmap(strip)(jnp.minimum(zeniths, horizon - 1e-6))
+
+
+@eqx.filter_jit
+def _pixels(
+    sky: SolvedSky,
+    camera: AbstractCamera,
+    light: Sun,
+    depths: Float[Array, "strip wl"],
+    pixels: Float[Array, "pixel 2"],
+    response: Response,
+    samples: int,
+) -> Float[Array, "pixel channel"]:
+    """What one sees of a disk in some pixels, given by column and row."""
+    top, bottom, horizon = _strips(sky, camera, light)
+    places = (jnp.arange(samples, dtype=pixels.dtype) + 0.5) / samples
+
+    def look(x, y):
+        direction = camera.direction(x, y)
+        east, north, up = direction
+        zenith = jnp.arctan2(jnp.sqrt(east * east + north * north), up)
+        at = (zenith - top) / (bottom - top) * (_STRIPS - 1.0)
+        i = jnp.clip(jnp.floor(at), 0.0, _STRIPS - 2.0).astype(int)
+        depth = depths[i] + (at - i) * (depths[i + 1] - depths[i])
+        radiance = light.radiance(direction, sky.wavelength) * jnp.exp(-depth)
+        area = camera.solid_angle(x, y)
+        return jnp.where(zenith < horizon, radiance, 0.0) * area, area
+
+    def pixel(corner):
+        x, y = jnp.meshgrid(corner[0] + places, corner[1] + places)
+        energy, area = jax.vmap(look)(x.ravel(), y.ravel())
+        return jnp.sum(energy, 0) / jnp.sum(area)
+
+    seen = jax.lax.map(pixel, pixels, batch_size=max(1, 4096 // samples**2))
+    return jnp.matmul(seen, response, precision="highest")

@@ -1,0 +1,81 @@
+"""From a sky to a picture: one radiance per pixel and wavelength, or colour."""
+
+from collections.abc import Callable
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from .camera import AbstractCamera
+from .sky import AbstractSky, Panorama
+
+
+_BLOCK = 2**13  # pixels that are worked on together, so that they stay in the cache
+_STRETCH = 2**20  # pixels between two reports of progress
+
+Response = Float[Array, "wl channel"]
+
+
+def render(
+    sky: AbstractSky,
+    camera: AbstractCamera,
+    response: Response | None = None,
+    *,
+    progress: Callable[[float], None] = lambda done: None,
+) -> Float[Array, "height width channel"]:
+    """Looks at the sky through the camera: everything but the disks of the lights.
+
+    Spectral radiance in W m^-2 sr^-1 nm^-1, its last axis the wavelength; or, with a
+    `response`, the sum over wavelengths of radiance times response, such as XYZ from
+    `colour.response`. What the camera does not see is 0. `progress` is told now and then
+    which share is done. Raises `ValueError` unless the camera stands straight above the
+    origin.
+    """
+    dtype = sky.wavelength.dtype
+    camera = jax.tree.map(lambda x: x.astype(dtype), camera)
+    response = None if response is None else response.astype(dtype)
+    panorama = sky.panorama(camera.position)
+    zenith, azimuth = camera.angles()
+    if zenith.shape[1] > 1:
+        panorama = _finer(panorama)
+        zenith, azimuth = jnp.broadcast_arrays(zenith, azimuth)
+    # Stretches alike in size, so that they share one compilation.
+    count = -(-camera.height * camera.width // _STRETCH)
+    rows = -(-camera.height // count)
+    parts = []
+    for first in range(0, camera.height, rows):
+        part = slice(first, first + rows)
+        around = azimuth[part] if azimuth.shape[0] > 1 else azimuth
+        parts.append(_stretch(panorama, zenith[part], around, response))
+        progress(min(1.0, (first + rows) / camera.height))
+    image = parts[0] if len(parts) == 1 else jnp.concatenate(parts)
+    sees = camera.sees()
+    return image if sees.size == 1 else jnp.where(sees[..., None], image, 0.0)
+
+
+@eqx.filter_jit
+def _finer(panorama: Panorama) -> Panorama:
+    return panorama.finer()
+
+
+@eqx.filter_jit
+def _stretch(
+    panorama: Panorama,
+    zenith: Float[Array, "height #width"],
+    azimuth: Float[Array, "#height width"],
+    response: Response | None,
+) -> Float[Array, "height width channel"]:
+    def row(zenith, azimuth):
+        radiance = panorama.radiance(zenith[None], azimuth[None])[0]
+        if response is None:
+            return radiance
+        return jnp.matmul(radiance, response, precision="highest")
+
+    height, width = zenith.shape[0], azimuth.shape[1]
+    most = max(1, _BLOCK // width)
+    together = max(x for x in range(1, min(most, height) + 1) if height % x == 0)
+    if azimuth.shape[0] > 1:
+        look = lambda x: row(*x)
+        return jax.lax.map(look, (zenith, azimuth), batch_size=together)
+    return jax.lax.map(lambda x: row(x, azimuth[0]), zenith, batch_size=together)
