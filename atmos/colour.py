@@ -168,16 +168,15 @@ COLOUR_SPACES = {
 
 
 def automatic_exposure(xyz: Float[Array, "*batch 3"]) -> Number:
-    """The exposure value (ISO 100) of the logarithmic mean luminance of what is lit.
+    """The exposure value (ISO 100) of the mean luminance of what is lit.
 
     A meter with the constant K = 12.5 cd s m^-2 reads EV where the luminance is
     2**(EV - 3) cd m^-2: 15 in the sun, 0 in late twilight, -6 under the stars.
     """
     luminance = xyz[..., 1]
-    lit = luminance > 0.0
-    logarithm = jnp.where(lit, jnp.log2(jnp.where(lit, luminance, 1.0)), 0.0)
-    count = jnp.sum(lit, dtype=xyz.dtype)
-    return jnp.sum(logarithm) / jnp.maximum(count, 1.0) + 3.0
+    lit = jnp.sum(luminance > 0.0, dtype=xyz.dtype)
+    mean = jnp.sum(luminance) / jnp.maximum(lit, 1.0)
+    return jnp.log2(jnp.where(lit > 0.0, mean, 1.0)) + 3.0
 
 
 @jax.jit

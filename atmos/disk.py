@@ -15,15 +15,16 @@ from .solver import SolvedSky
 from .transport import optical_depth
 
 
-_ACROSS = 64  # samples across a disk, at least
+_MET = 25_000  # samples that meet a disk, at least, if it is small
+_GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 _STRIPS = 33  # zenith angles at which the air in front of a disk is known
-_TOGETHER = 2**14  # samples that are worked on together
+_TOGETHER = 2**15  # samples that are worked on together
 
 
 def render_disks(
     sky: SolvedSky, camera: AbstractCamera, response: Response | None = None
 ) -> Float[np.ndarray, "height width channel"]:
-    """The disks of the lights alone, through the air: to be added to `render`'s picture.
+    """The disks of the lights alone, through the air: to be added to what `render` saw.
 
     Each pixel is the mean over its area, so that the picture holds a light's irradiance
     however coarse it is. Shape and unit are those of `render`.
@@ -39,15 +40,18 @@ def render_disks(
         if radius <= 0.0:
             continue
         rows, columns = _near(camera, light, radius + extent)
-        finest = math.ceil(math.log2(max(1.0, extent * _ACROSS / radius)))
-        samples = 2 ** min(finest, 6)
-        together = _TOGETHER // samples**2
+        if not rows.size:
+            continue
+        samples = _samples(camera, radius, rows, columns)
+        together = _TOGETHER // samples
         depths = _depths(sky, camera, light)
         for i in range(0, rows.size, together):
             part = slice(i, i + together)
             pixels = np.stack([columns[part], rows[part]], -1).astype(dtype)
             filled = np.pad(pixels, ((0, together - len(pixels)), (0, 0)), mode="edge")
-            seen = _pixels(sky, camera, light, depths, filled, response, samples)
+            seen = _pixels(
+                sky, camera, light, depths, jnp.asarray(filled), response, samples
+            )
             image[rows[part], columns[part]] += np.asarray(seen)[: len(pixels)]
     return image
 
@@ -61,11 +65,22 @@ def _near(
     aside = np.sin(0.5 * (azimuth - np.asarray(light.azimuth)))
     level = np.sin(zenith) * np.sin(np.asarray(light.zenith))
     near = apart * apart + level * aside * aside <= (0.5 * reach) ** 2
-    return np.nonzero(near & np.asarray(camera.sees()))
+    rows, columns = np.nonzero(near & np.asarray(camera.sees()))
+    return rows, columns
+
+
+def _samples(
+    camera: AbstractCamera, radius: float, rows: np.ndarray, columns: np.ndarray
+) -> int:
+    """How many samples a pixel takes, so that a disk meets `_MET` or more in all."""
+    x, y = (jnp.asarray(z + 0.5, camera.position.dtype) for z in (columns, rows))
+    share = float(jnp.max(jax.vmap(camera.solid_angle)(x, y))) / (math.pi * radius**2)
+    fewest = 8 if rows.size < 2**15 else 4
+    return 2 ** min(max(math.ceil(math.log2(share * _MET)), fewest), 12)
 
 
 def _extent(camera: AbstractCamera) -> float:
-    """The angle from the centre of a pixel to a corner: the largest, or somewhat more."""
+    """The largest angle from the centre of a pixel to a corner, or somewhat more."""
     steps = jnp.linspace(0.5, 8.5, 9, dtype=camera.position.dtype) / 9.0
     y, x = (
         z.ravel() for z in jnp.meshgrid(steps * camera.height, steps * camera.width)
@@ -113,23 +128,26 @@ def _pixels(
 ) -> Float[Array, "pixel channel"]:
     """What one sees of a disk in some pixels, given by column and row."""
     top, bottom, horizon = _strips(sky, camera, light)
-    places = (jnp.arange(samples, dtype=pixels.dtype) + 0.5) / samples
+    # A lattice in which no two samples share a row or a column: an edge that runs along
+    # them is met as finely as any other.
+    down = (jnp.arange(samples, dtype=pixels.dtype) + 0.5) / samples
+    across = jnp.asarray(np.arange(samples) * _GOLDEN % 1.0, pixels.dtype)
 
     def look(x, y):
         direction = camera.direction(x, y)
         east, north, up = direction
         zenith = jnp.arctan2(jnp.sqrt(east * east + north * north), up)
         at = (zenith - top) / (bottom - top) * (_STRIPS - 1.0)
-        i = jnp.clip(jnp.floor(at), 0.0, _STRIPS - 2.0).astype(int)
-        depth = depths[i] + (at - i) * (depths[i + 1] - depths[i])
+        strip = jnp.clip(jnp.floor(at), 0.0, _STRIPS - 2.0)
+        i = strip.astype(int)
+        depth = depths[i] + (at - strip) * (depths[i + 1] - depths[i])
         radiance = light.radiance(direction, sky.wavelength) * jnp.exp(-depth)
         area = camera.solid_angle(x, y)
         return jnp.where(zenith < horizon, radiance, 0.0) * area, area
 
     def pixel(corner):
-        x, y = jnp.meshgrid(corner[0] + places, corner[1] + places)
-        energy, area = jax.vmap(look)(x.ravel(), y.ravel())
+        energy, area = jax.vmap(look)(corner[0] + across, corner[1] + down)
         return jnp.sum(energy, 0) / jnp.sum(area)
 
-    seen = jax.lax.map(pixel, pixels, batch_size=max(1, 4096 // samples**2))
+    seen = jax.lax.map(pixel, pixels, batch_size=max(1, 4096 // samples))
     return jnp.matmul(seen, response, precision="highest")

@@ -7,6 +7,7 @@ difference of two radii has lost what matters near the ground and the horizon.
 import abc
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
@@ -42,6 +43,13 @@ class AbstractPath(eqx.Module):
 
     start: eqx.AbstractVar[Point]
     direction: eqx.AbstractVar[Direction]
+
+    @abc.abstractmethod
+    def enter(self, top: Length) -> "AbstractPath":
+        """The same ray from where it falls below `top`; the whole of it, if it never does.
+
+        Exactly at `top`, however far away it started.
+        """
 
     @abc.abstractmethod
     def at(self, distance: Length) -> Point:
@@ -116,6 +124,14 @@ class FlatPath(AbstractPath):
             jnp.abs(slope) < 1e-6, jnp.where(slope < 0, -1e-6, 1e-6), slope
         )
 
+    def enter(self, top: Length) -> "FlatPath":
+        start = self.start
+        above = (start.altitude > top) & (self._slope < 0.0)
+        near = jnp.where(above, self.crossings(top)[0], 0.0)
+        altitude = jnp.where(above, top, start.altitude)
+        position = start.position + near * self.direction
+        return FlatPath(Point(position, altitude, start.up), self.direction)
+
     def at(self, distance: Length) -> Point:
         position = self.start.position + distance * self.direction
         altitude = self.start.altitude + distance * self._slope
@@ -158,7 +174,8 @@ class Spherical(AbstractGeometry):
         return Point(position, altitude, from_centre / distance)
 
     def path(self, start: Point, direction: Direction) -> "SphericalPath":
-        return SphericalPath(start, direction, self.radius)
+        rise = (self.radius + start.altitude) * jnp.dot(start.up, direction)
+        return SphericalPath(start, direction, self.radius, rise)
 
     def dip(self, altitude: Length, height: Length) -> Angle:
         squared = (altitude - height) * (altitude + height + 2.0 * self.radius)
@@ -168,37 +185,57 @@ class Spherical(AbstractGeometry):
 
 
 class SphericalPath(AbstractPath):
-    """A ray over a round planet."""
+    """A ray over a round planet.
+
+    `rise` is the distance from the place nearest to the planet's centre to the start.
+    """
 
     start: Point
     direction: Direction
     radius: Length
+    rise: Length
 
     @property
     def _from_centre(self) -> Length:
         return self.radius + self.start.altitude
 
-    @property
-    def _rise(self) -> Length:
-        """The distance from the place nearest to the planet's centre to the start."""
-        return self._from_centre * jnp.dot(self.start.up, self.direction)
+    def enter(self, top: Length) -> "SphericalPath":
+        start, r = self.start, self._from_centre
+        # How low it will come, from the sine and the cosine at the start: from space the
+        # sine has digits that one minus the square of the cosine has lost.
+        across = jnp.cross(start.up, self.direction)
+        squared = jnp.dot(across, across)
+        aside = squared > 0.0
+        sine = jnp.where(aside, jnp.sqrt(jnp.where(aside, squared, 1.0)), 0.0)
+        cosine = self.rise / r
+        low = start.altitude * sine - self.radius * cosine * cosine / (1.0 + sine)
+        chord = (top - low) * (top + low + 2.0 * self.radius)
+        enters = (start.altitude > top) & (self.rise < 0.0) & (chord > 0.0)
+        half = jnp.where(enters, jnp.sqrt(jnp.where(enters, chord, 1.0)), 0.0)
+        position = start.position + jnp.maximum(-half - self.rise, 0.0) * self.direction
+        from_centre = position.at[2].add(self.radius)
+        up = from_centre / jnp.sqrt(jnp.dot(from_centre, from_centre))
+        inner = Point(position, top, up), -half
+        outer = self.start, self.rise
+        start, rise = jax.tree.map(lambda x, y: jnp.where(enters, x, y), inner, outer)
+        return SphericalPath(start, self.direction, self.radius, rise)
 
     def at(self, distance: Length) -> Point:
         r = self._from_centre
-        q = distance * (distance + 2.0 * self._rise)
+        q = distance * (distance + 2.0 * self.rise)
         altitude = self.start.altitude + q / (jnp.sqrt(r * r + q) + r)
         position = self.start.position + distance * self.direction
         up = position.at[2].add(self.radius) / (self.radius + altitude)
         return Point(position, altitude, up)
 
     def lowest(self) -> Length:
-        return -self._rise
+        return -self.rise
 
     def crossings(self, altitude: Length) -> Float[Array, "2"]:
         return self._meet(altitude)[0]
 
     def _meet(self, altitude: Length) -> tuple[Float[Array, "2"], Bool[Array, ""]]:
-        b, h = self._rise, self.start.altitude
+        b, h = self.rise, self.start.altitude
         c = (h - altitude) * (h + altitude + 2.0 * self.radius)
         discriminant = b * b - c
         hit = discriminant > 0.0
@@ -209,7 +246,7 @@ class SphericalPath(AbstractPath):
     def span(self, top: Length) -> Span:
         (enter, leave), crosses = self._meet(top)
         (ground, _), hits = self._meet(jnp.zeros_like(top))
-        grounded = hits & (self._rise < 0.0)
+        grounded = hits & (self.rise < 0.0)
         near = jnp.maximum(jnp.where(crosses, enter, 0.0), 0.0)
         far = jnp.where(grounded, ground, jnp.where(crosses, leave, near))
         return Span(near, jnp.maximum(far, near), grounded)
@@ -221,7 +258,7 @@ class SphericalPath(AbstractPath):
         ahead = self._from_centre * jnp.dot(self.start.up, sun)
         h = self.start.altitude
         a = jnp.maximum(apart * (2.0 - apart), _TINY)
-        b = self._rise - ahead * along
+        b = self.rise - ahead * along
         c = (h - altitude) * (h + altitude + 2.0 * self.radius) - ahead * ahead
         discriminant = b * b - a * c
         inside = discriminant > 0.0

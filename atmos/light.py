@@ -5,7 +5,6 @@ import math
 
 import equinox as eqx
 import jax.numpy as jnp
-import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
 from .quantity import (
@@ -24,8 +23,9 @@ from .spectrum import AbstractSpectrum, as_spectrum, BandAverage
 
 SOLAR_RADIUS = 0.26656 * deg  # 959.63 arcseconds, seen from 1 astronomical unit
 
-# Neckel 2005, Solar Physics 229, 13: brightness towards the limb, relative to the centre,
-# is the sum over k of (a + b / w + c / w^5) mu^k, with w in um; from w on, until the next.
+# Neckel 2005, Solar Physics 229, 13: brightness towards the limb, relative to the
+# centre, is the sum over k of (a + b / w + c / w^5) mu^k, with w in um; from w on,
+# until the next.
 _LIMB = [
     (
         0.300,
@@ -79,7 +79,8 @@ class Sun(eqx.Module):
 
     @property
     def horizontal(self) -> Float[Array, "2"]:
-        """East and north of the unit vector on the ground that points towards the sun."""
+        """East and north of the unit vector on the ground that points towards the
+        sun."""
         east, north, _ = self.direction
         squared = east * east + north * north
         aside = squared > 0.0
@@ -109,44 +110,43 @@ class Sun(eqx.Module):
         inside = share < 1.0
         cosine = jnp.sqrt(jnp.where(inside, 1.0 - share, 1.0))
         coefficients = limb_darkening(wavelength)
-        shape = jnp.sum(coefficients * cosine ** _POWERS[:, None], 0)
+        powers = jnp.stack([cosine**k for k in range(6)])[:, None]
         even = self.irradiance.evaluate(wavelength) / (2.0 * math.pi * widest)
-        return jnp.where(inside, even * shape / _mean(coefficients), 0.0)
+        shape = jnp.sum(coefficients * powers, 0) / _mean(coefficients)
+        return jnp.where(inside, even * shape, 0.0)
 
     def slice(self, height: Number, wavelength: Wavelength) -> Float[Array, "wl"]:
         """The share of the irradiance that comes from a strip across the disk.
 
-        Per unit of `height`, which is counted in radii from the centre: its integral from
-        -1 to 1 is 1.
+        Per unit of `height`, which is counted in radii from the centre: its integral
+        from -1 to 1 is 1.
         """
         coefficients = limb_darkening(wavelength)
-        half = jnp.maximum(1.0 - height * height, 0.0)
-        powers = jnp.stack([half**k for k in (_POWERS + 1.0) / 2.0])[:, None]
-        return jnp.sum(coefficients * _CHORDS[:, None] * powers, 0) / (
-            math.pi * _mean(coefficients)
-        )
+        squared = 1.0 - height * height
+        inside = squared > 0.0
+        half = jnp.where(inside, jnp.sqrt(jnp.where(inside, squared, 1.0)), 0.0)
+        # A strip of half-width s integrates s^(k + 1) cos^(k + 1) over half a turn.
+        chords = [_CHORDS[k] * half ** (k + 1) for k in range(6)]
+        total = jnp.sum(coefficients * jnp.stack(chords)[:, None], 0)
+        return total / (math.pi * _mean(coefficients))
 
 
 _TINY = 1e-30
-_POWERS = np.arange(6)
-# The integral of cos^(k + 1) over half a turn.
-_CHORDS = np.array(
-    [
-        math.sqrt(math.pi) * math.gamma(k / 2 + 1) / math.gamma(k / 2 + 1.5)
-        for k in range(6)
-    ]
-)
+_CHORDS = [
+    math.sqrt(math.pi) * math.gamma(k / 2 + 1) / math.gamma(k / 2 + 1.5)
+    for k in range(6)
+]
 
 
 def limb_darkening(wavelength: Wavelength) -> Float[Array, "6 wl"]:
     """The coefficients of brightness on the sun's disk as a polynomial.
 
     Its variable is the cosine of the angle at which one looks into the sun, 1 in the
-    middle and 0 at the limb; in the middle the brightness is 1. Known from 300 to 1100 nm
-    (Neckel 2005), and held from there on.
+    middle and 0 at the limb; in the middle the brightness is 1. Known from 300 to 1100
+    nm (Neckel 2005), and held from there on.
     """
-    w = jnp.clip(wavelength, 300.0, 1100.0) / 1000.0
-    found = jnp.zeros((6, *w.shape), w.dtype)
+    w = jnp.clip(wavelength, 300.0, 1100.0)[None, :] / 1000.0
+    found = jnp.zeros_like(w)
     for start, *terms in _LIMB:
         a, b, c = (jnp.asarray(x, w.dtype)[:, None] for x in terms)
         found = jnp.where(w >= start, a + b / w + c / w**5, found)
@@ -155,15 +155,15 @@ def limb_darkening(wavelength: Wavelength) -> Float[Array, "6 wl"]:
 
 def _mean(coefficients: Float[Array, "6 wl"]) -> Float[Array, "wl"]:
     """The mean brightness of the disk, relative to its centre."""
-    weights = jnp.asarray(2.0 / (_POWERS + 2.0), coefficients.dtype)
-    return jnp.sum(coefficients * weights[:, None], 0)
+    weights = [2.0 / (k + 2.0) for k in range(6)]
+    return jnp.sum(coefficients * jnp.array(weights, coefficients.dtype)[:, None], 0)
 
 
 def sunlight(bandwidth: ArrayLike = 10.0, distance: ArrayLike = 1.0) -> BandAverage:
     """The sun's spectrum outside the air, in W m^-2 nm^-1 (ASTM G173-03).
 
-    Averaged over bands of `bandwidth` nm, at a `distance` in astronomical units: 1.524 is
-    that of Mars.
+    Averaged over bands of `bandwidth` nm, at a `distance` in astronomical units: 1.524
+    is that of Mars.
     """
     wavelength, irradiance = solar_irradiance()
     return BandAverage(wavelength, irradiance / as_float(distance) ** 2, bandwidth)

@@ -28,9 +28,9 @@ def render(
 
     Spectral radiance in W m^-2 sr^-1 nm^-1, its last axis the wavelength; or, with a
     `response`, the sum over wavelengths of radiance times response, such as XYZ from
-    `colour.response`. What the camera does not see is 0. `progress` is told now and then
-    which share is done. Raises `ValueError` unless the camera stands straight above the
-    origin.
+    `colour.response`. What the camera does not see is 0. `progress` is told now and
+    then which share is done. Raises `ValueError` unless the camera stands straight
+    above the origin.
     """
     dtype = sky.wavelength.dtype
     camera = jax.tree.map(lambda x: x.astype(dtype), camera)

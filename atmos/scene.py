@@ -45,7 +45,7 @@ def air() -> Medium:
 
 
 def ozone(dobson_units: ArrayLike) -> Medium:
-    """An ozone layer between 10 and 40 km (Bruneton 2017); 300 Dobson units are usual."""
+    """An ozone layer from 10 to 40 km (Bruneton 2017); 300 Dobson units are usual."""
     half_width = 15.0 * km
     most = as_float(dobson_units) * (DOBSON / half_width)
     return Medium(
@@ -85,8 +85,8 @@ def mars(
 ) -> Scene:
     """Mars: thin carbon dioxide, and dust of an optical depth at 550 nm.
 
-    Radius and scale height from NASA's Mars fact sheet (Williams 2021); 610 Pa and 210 K
-    at the ground. The sun is `1.524` times as far away as from the Earth.
+    Radius, scale height, pressure and temperature at the ground (610 Pa, 210 K) from
+    NASA's Mars fact sheet. The sun is 1.524 times as far away as from the Earth.
     """
     gas = CarbonDioxide()
     number_density = 610.0 / (1.380649e-23 * 210.0)

@@ -53,8 +53,8 @@ class PowerLaw(AbstractSpectrum):
 class Tabulated(AbstractSpectrum):
     """Straight lines between `values` at the rising wavelengths `knots`, in nm.
 
-    Beyond the knots it is `below` and `above`; where these are None it is not known, and
-    a scene that asks for it there is refused.
+    Beyond the knots it is `below` and `above`; where these are None it is not known,
+    and a scene that asks for it there is refused.
     """
 
     knots: Float[Array, "n"] = eqx.field(converter=as_float)
@@ -151,8 +151,8 @@ def as_spectrum(x: ArrayLike | AbstractSpectrum) -> AbstractSpectrum:
 def check_table(key: str, knots: Array, name: str, values: Array) -> None:
     """Refuses a table that does not rise, or does not pair.
 
-    Raises `ValueError` unless `knots` are two or more finite numbers, each above the last,
-    with as many finite `values`.
+    Raises `ValueError` unless `knots` are two or more finite numbers, each above the
+    last, with as many finite `values`.
     """
     if knots.ndim != 1 or knots.shape[0] < 2 or knots.shape != values.shape:
         raise ValueError(

@@ -101,11 +101,10 @@ def enter(
     An observer above the air is moved to its top, so that no digits are lost on the way.
     """
     path = scene.geometry.path(scene.geometry.locate(position), direction)
+    path = path.enter(scene.top)
     span = path.span(scene.top)
-    start = path.at(span.near)
-    inside = span.near <= 0.0
-    start = jax.tree.map(lambda a, b: jnp.where(inside, a, b), path.start, start)
-    return scene.geometry.path(start, direction), span.far - span.near, span.grounded
+    # What grazes the top, and by rounding has not entered, is out.
+    return path, jnp.where(span.near > 0.0, 0.0, span.far), span.grounded
 
 
 def optical_depth(

@@ -25,7 +25,9 @@ _SHARES = _STEP * np.cosh(_T) / np.cosh(0.5 * np.pi * np.sinh(_T)) ** 2
 def densities(altitude):
     """Of air, dust and ozone, on the last axis."""
     bottom, centre, top = OZONE
-    ozone = np.minimum((altitude - bottom) / (centre - bottom), (top - altitude) / (top - centre))
+    ozone = np.minimum(
+        (altitude - bottom) / (centre - bottom), (top - altitude) / (top - centre)
+    )
     air, dust = np.exp(-altitude / 8000.0), np.exp(-altitude / 1200.0)
     return np.stack([air, dust, np.maximum(ozone, 0.0)], -1)
 
@@ -41,11 +43,15 @@ def extinctions(wavelength):
 def columns(nearest, begin, end):
     """From `begin` to `end` (counted from the nearest place) on rays of that altitude."""
     distance = RADIUS + nearest
-    away = (_LEVELS - nearest[..., None]) * (_LEVELS + nearest[..., None] + 2.0 * RADIUS)
+    away = (_LEVELS - nearest[..., None]) * (
+        _LEVELS + nearest[..., None] + 2.0 * RADIUS
+    )
     away = np.sqrt(np.maximum(away, 0.0))
     edges = np.concatenate([-away[..., ::-1], away], -1)
     edges = np.clip(edges, begin[..., None], np.maximum(end, begin)[..., None])
-    edges = np.concatenate([begin[..., None], edges, np.maximum(end, begin)[..., None]], -1)
+    edges = np.concatenate(
+        [begin[..., None], edges, np.maximum(end, begin)[..., None]], -1
+    )
     middle, half = 0.5 * (edges[..., 1:] + edges[..., :-1]), 0.5 * np.diff(edges)
     nodes, weights = _GAUSS
     x = middle[..., None] + half[..., None] * nodes
@@ -141,7 +147,9 @@ def radiance(altitude, view, sun, wavelength, present=(1.0, 1.0, 1.0)):
     scattering = extinction[:, :2] * [1.0, SHARE]
     cosine = np.dot(view, sun) / np.linalg.norm(view) / np.linalg.norm(sun)
     arrives = np.exp(-ways @ extinction.T)
-    total = np.einsum("pm,pl,lm,m->l", amounts[:, :2], arrives, scattering, phases(cosine))
+    total = np.einsum(
+        "pm,pl,lm,m->l", amounts[:, :2], arrives, scattering, phases(cosine)
+    )
     if ground is not None:
         way, rise = ground
         total += ALBEDO / np.pi * rise * np.exp(-way @ extinction.T)[0]

@@ -35,7 +35,7 @@ def _log_density_at_bases():
     return -np.concatenate([[0.0], np.cumsum(falls)])
 
 
-_LOG_DENSITY = _log_density_at_bases()
+_TABLES = (_BASE, _LAPSE, _TEMPERATURE, _log_density_at_bases())
 
 
 class StandardAtmosphere(AbstractProfile):
@@ -50,10 +50,10 @@ class StandardAtmosphere(AbstractProfile):
                 lambda below, layer: jnp.where(
                     geopotential > layer[0], layer[1], below
                 ),
-                zip(_BASE[1:], table[1:], strict=True),
+                zip(_BASE[1:].tolist(), table[1:], strict=True),
                 jnp.full_like(h, table[0]),
             )
-            for table in (_BASE, _LAPSE, _TEMPERATURE, _LOG_DENSITY)
+            for table in map(np.ndarray.tolist, _TABLES)
         )
         x = lapse * (geopotential - base) / temperature
         fall = _PULL / temperature * (geopotential - base) * _log1p_over(x)
@@ -65,4 +65,4 @@ class StandardAtmosphere(AbstractProfile):
         return jnp.asarray(h)
 
     def breaks(self, path: AbstractPath) -> Float[Array, "n"]:
-        return crossings(path, self.levels)
+        return crossings(path, self.levels.astype(path.start.altitude.dtype))

@@ -36,7 +36,7 @@ class AbstractPhaseFunction(eqx.Module):
     ) -> "tuple[tuple[AbstractPhaseFunction, Spectral], ...]":
         """Phase functions that make up this one, and the weight of each.
 
-        Where a function changes with the wavelength, and yet is a mixture of some that do
-        not, pictures are quicker to make of those.
+        Where a function changes with the wavelength, and yet is a mixture of some that
+        do not, pictures are quicker to make of those.
         """
         return ((self, jnp.ones_like(wavelength[:1])),)

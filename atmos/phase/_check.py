@@ -27,4 +27,4 @@ def check_between(
         inside = (values >= low) & (values <= high) & np.isfinite(values)
         if not np.all(inside):
             rule = f"at least {low:g}" if high == math.inf else f"{low} to {high}"
-            raise ValueError(f"`{name}` must be {rule}; got {values[~inside][0]}.")
+            raise ValueError(f"`{name}` must be {rule}; got {values[~inside][0]!s}.")

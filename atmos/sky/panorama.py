@@ -1,6 +1,8 @@
 """A sky as seen from one place: a table that is quick to look up."""
 
+import functools as ft
 import math
+import operator
 from collections.abc import Callable
 
 import equinox as eqx
@@ -18,7 +20,7 @@ _FINER = 4
 
 
 class Resolution(eqx.Module):
-    """How many rings a grid has above and below the horizon, and azimuths around half."""
+    """How many rings lie above and below the horizon; how many azimuths on half a ring."""
 
     above: int = eqx.field(static=True)
     below: int = eqx.field(static=True)
@@ -32,9 +34,9 @@ FINE = Resolution(128, 96, 65)
 class Grid(eqx.Module):
     """Directions: rings of equal zenith angle, and azimuths on them.
 
-    Rings crowd at the horizon from both sides, and at the edge of the air if that is seen
-    from outside. Azimuths run from that of the light to
-    the opposite one: the other half of the sky is alike.
+    Rings crowd at the horizon from both sides, and at the edge of the air if that is
+    seen from outside. Azimuths run from that of the light to the opposite one: the
+    other half of the sky is alike.
     """
 
     first: Angle  # the highest ring: what is above it is black
@@ -88,7 +90,7 @@ def _cubic(
 ) -> tuple[Int[Array, "*n"], Float[Array, "*n 4"]]:
     """The first of four places, from `low` to `high`, around x; Lagrange's weights."""
     first = jnp.clip(jnp.floor(jax.lax.stop_gradient(x)) - 1.0, low, high - 3.0)
-    a, b, c, d = (x - first - k for k in range(4))
+    a, b, c, d = (x - first - float(k) for k in range(4))
     weights = [-b * c * d / 6.0, a * c * d / 2.0, -a * b * d / 2.0, a * b * c / 6.0]
     return first.astype(int), jnp.stack(weights, -1)
 
@@ -96,9 +98,9 @@ def _cubic(
 class Panorama(eqx.Module):
     """The light that arrives at one place from all directions.
 
-    For each light, `table` holds the radiance on a grid of directions, in parts: one for
-    each phase function, which is put on only when looked up and so stays exact, and a
-    last one that has none.
+    For each light, `table` holds the radiance on a grid of directions, in parts: one
+    for each phase function, which is put on only when looked up and so stays exact, and
+    a last one that has none.
     """
 
     grid: Grid
@@ -115,9 +117,10 @@ class Panorama(eqx.Module):
     ) -> Float[Array, "height width wl"]:
         """The radiance from each direction of a picture, in W m^-2 sr^-1 nm^-1.
 
-        Angles in rad, azimuth clockwise from north. Where the pixels of a row share their
-        zenith angle, and those of a column their azimuth, it lies on a cubic through the
-        directions of the grid; elsewhere on straight lines, for which see `finer`.
+        Angles in rad, azimuth clockwise from north. Where the pixels of a row share
+        their zenith angle, and those of a column their azimuth, it lies on a cubic
+        through the directions of the grid; elsewhere on straight lines, for which see
+        `finer`.
         """
         shape = jnp.broadcast_shapes(zenith.shape, azimuth.shape)
         total = jnp.zeros((*shape, *self.wavelength.shape), self.wavelength.dtype)
@@ -134,7 +137,10 @@ class Panorama(eqx.Module):
     def _weights(self, turned):
         """What each part of the table is to be multiplied by, pixel by pixel."""
         look = lambda p: jax.vmap(jax.vmap(lambda v: p.evaluate(v, self.wavelength)))
-        return [*(look(x)(turned) for x in self.phases), jnp.ones((*turned.shape, 1))]
+        return [
+            *(look(x)(turned) for x in self.phases),
+            jnp.ones_like(turned)[..., None],
+        ]
 
     def _rings(self, table, zenith):
         """The table at other zenith angles, with one more azimuth at each end."""
@@ -143,16 +149,17 @@ class Panorama(eqx.Module):
         low = jnp.where(grounded, float(size.above), 0.0)
         count = jnp.where(grounded, float(size.below), float(size.above))
         first, weights = _cubic(grid.ring(zenith), low, low + count - 1.0)
-        weights = weights[:, :, None, None, None]
-        rings = sum(weights[:, k] * table[first + k] for k in range(4))
+        taps = table[first[:, None] + jnp.arange(4)[None, :]]
+        rings = jnp.sum(weights[:, :, None, None, None] * taps, 1)
         return jnp.pad(rings, ((0, 0), (1, 1), (0, 0), (0, 0)), mode="reflect")
 
     def _mixing(self, relative):
         """What each azimuth of such rings counts at other azimuths."""
         count = self.grid.resolution.around + 2
         first, weights = _cubic(self.grid.side(relative) + 1.0, 0.0, count - 1.0)
-        place = jnp.arange(count)[None, :] - first[:, None]
-        return sum(jnp.where(place == k, weights[:, k, None], 0.0) for k in range(4))
+        place = jnp.arange(count)[None, :, None] - first[:, None, None]
+        taken = place == jnp.arange(4)[None, None, :]
+        return jnp.sum(jnp.where(taken, weights[:, None, :], 0.0), -1)
 
     def _rows(self, table, zenith, relative, weights):
         rings, mixing = self._rings(table, zenith[:, 0]), self._mixing(relative[0])
@@ -175,15 +182,17 @@ class Panorama(eqx.Module):
         grid, size = self.grid, self.grid.resolution
         ring, side = jnp.broadcast_arrays(grid.ring(zenith), grid.side(relative))
         grounded = zenith > grid.horizon
-        low = jnp.where(grounded, size.above, 0)
-        high = jnp.where(grounded, size.above + size.below, size.above)
-        i = jnp.clip(jnp.floor(ring).astype(int), low, high - 2)
-        j = jnp.clip(jnp.floor(side).astype(int), 0, size.around - 2)
-        s, t = (ring - i)[..., None, None], (side - j)[..., None, None]
+        low = jnp.where(grounded, float(size.above), 0.0)
+        count = jnp.where(grounded, float(size.below), float(size.above))
+        first = jnp.clip(jnp.floor(ring), low, low + count - 2.0)
+        other = jnp.clip(jnp.floor(side), 0.0, size.around - 2.0)
+        s, t = (ring - first)[..., None, None], (side - other)[..., None, None]
+        i, j = first.astype(int), other.astype(int)
         upper = (1.0 - t) * table[i, j] + t * table[i, j + 1]
         lower = (1.0 - t) * table[i + 1, j] + t * table[i + 1, j + 1]
         parts = (1.0 - s) * upper + s * lower
-        return sum(x * parts[..., i, :] for i, x in enumerate(weights))
+        weighted = [x * parts[..., i, :] for i, x in enumerate(weights)]
+        return ft.reduce(operator.add, weighted)
 
     def finer(self) -> "Panorama":
         """The same on a grid four times as fine: for pictures that are not in rows."""

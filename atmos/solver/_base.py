@@ -92,7 +92,7 @@ class SolvedSky(AbstractSky):
         )
 
     def _edges(self, altitude):
-        """How far the horizon lies below level, and the zenith angle where air begins."""
+        """How far the horizon lies below level; the zenith angle where air begins."""
         geometry, top = self.scene.geometry, self.scene.top
         outside = altitude > top
         limb = geometry.dip(altitude, top)
@@ -155,29 +155,20 @@ def solve(scene: Scene, solver: AbstractSolver, wavelength: ArrayLike) -> Solved
     """Finds the light in a scene, at wavelengths in nm.
 
     All numbers take on the precision of `wavelength`. Raises `ValueError` unless the
-    wavelengths are one-dimensional, lie between 100 nm and 100 um, and every table of the
-    scene covers them.
+    wavelengths are one-dimensional, lie between 100 nm and 100 um, and every table of
+    the scene covers them.
     """
-    wavelength = as_float(wavelength)
-    if wavelength.ndim != 1:
-        raise ValueError(
-            f"`wavelength` must be one-dimensional; got shape {wavelength.shape}."
-        )
-    if isinstance(wavelength, Tracer):
-        wavelength = eqx.error_if(
-            wavelength,
-            ~jnp.all((wavelength >= 100.0) & (wavelength <= 1e5)),
-            "`wavelength` must lie between 100 and 100000 nm.",
-        )
+    nm = as_float(wavelength)
+    if nm.ndim != 1:
+        raise ValueError(f"`wavelength` must be one-dimensional; got shape {nm.shape}.")
+    if isinstance(nm, Tracer):
+        known = jnp.all((nm >= 100.0) & (nm <= 1e5))
+        nm = eqx.error_if(nm, ~known, "`wavelength` must lie between 100 and 1e5 nm.")
     else:
-        _check_wavelength(scene, np.asarray(wavelength))
-    scene = jax.tree.map(lambda x: x.astype(wavelength.dtype), scene)
-    return SolvedSky(
-        scene=scene,
-        solver=solver,
-        wavelength=wavelength,
-        prepared=solver.prepare(scene, wavelength),
-    )
+        _check_wavelength(scene, np.asarray(nm))
+    scene = jax.tree.map(lambda x: x.astype(nm.dtype), scene)
+    prepared = solver.prepare(scene, nm)
+    return SolvedSky(scene=scene, solver=solver, wavelength=nm, prepared=prepared)
 
 
 def _check_wavelength(scene: Scene, wavelength: np.ndarray) -> None:

@@ -7,7 +7,7 @@ from jaxtyping import Array, Bool, Float
 
 from ..geometry import AbstractPath, Point
 from ..light import Sun
-from ..quantity import Direction, Length, Position, Spectral, Wavelength
+from ..quantity import Direction, Length, Position, Wavelength
 from ..scene import Scene
 from ..transport import columns, cumulative, enter, extinctions, gauss_legendre
 from ._base import AbstractSolver
@@ -60,15 +60,15 @@ class SingleScattering(AbstractSolver):
             found = [x.profile.density(point) for x in scene.media]
             return jnp.stack(found) if found else jnp.zeros(0, far.dtype)
 
-        steps = jax.vmap(jax.vmap(profiles))(points) * slope[..., None]
+        steps = jax.vmap(jax.vmap(profiles))(points) * slope[:, :, None]
         within = _sum(
             "ij,pjm->pim", jnp.asarray(cumulative(self.nodes), far.dtype), steps
         )
         whole = _sum("j,pjm->pm", w, steps)
         before = jnp.cumsum(whole, 0) - whole
-        passed = before[:, None] + within + jax.vmap(jax.vmap(to_light))(points)
+        passed = before[:, None, :] + within + jax.vmap(jax.vmap(to_light))(points)
         arrives = jnp.exp(-_sum("pim,ml->pil", passed, extinction))
-        steps = jnp.where(lit[:, None, None], steps * w[:, None], 0.0)
+        steps = jnp.where(lit[:, None, None], steps * w[None, :, None], 0.0)
         gathered = _sum("pim,pil->ml", steps, arrives)
         air = [
             x.scattering.evaluate(wavelength) * gathered[i] * irradiance
@@ -124,7 +124,8 @@ class SingleScattering(AbstractSolver):
         # Close by, the light of a thick medium changes faster than the medium itself.
         edges = [seen * jnp.array([0.0, 0.0625, 0.25, 1.0], seen.dtype)]
         for x in scene.media:
-            edges += [x.profile.breaks(path), jax.vmap(graze)(x.profile.levels).ravel()]
+            levels = x.profile.levels.astype(seen.dtype)
+            edges += [x.profile.breaks(path), jax.vmap(graze)(levels).ravel()]
         edges = jnp.sort(jnp.clip(jnp.concatenate(edges), 0.0, seen))
         edges = _join(edges, self.pieces)
         dark = jnp.clip(graze(jnp.zeros_like(seen)), 0.0, seen)

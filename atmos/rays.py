@@ -1,0 +1,109 @@
+"""Many rays at once, in blocks of one shape: one compilation, and little memory."""
+
+import math
+from collections.abc import Iterator
+
+import equinox as eqx
+import jax
+import numpy as np
+from jaxtyping import ArrayLike, Float
+
+from .quantity import Direction, Position, Radiance
+from .solver import SolvedSky
+from .transport import optical_depth
+
+
+_FEWEST = 16  # wavelengths that are worked on together
+_TOGETHER = 2**14  # rays times wavelengths in a block
+
+Table = Float[np.ndarray, "ray wl"]
+
+
+def direction(zenith: ArrayLike, azimuth: ArrayLike) -> Float[np.ndarray, "*n 3"]:
+    """The unit vector at a zenith angle and an azimuth from north, in degrees.
+
+    In double precision: in single precision it would be off by 1e-7.
+    """
+    zenith, azimuth = np.radians(zenith), np.radians(azimuth)
+    level = np.sin(zenith)
+    parts = [level * np.sin(azimuth), level * np.cos(azimuth), np.cos(zenith)]
+    return np.stack(np.broadcast_arrays(*parts), -1)
+
+
+def padded(wavelength: Float[np.ndarray, "wl"]) -> Float[np.ndarray, "more"]:
+    """The wavelengths, and the last one again up to a power of two, 16 or more.
+
+    What is compiled for one number of wavelengths then serves others too.
+    """
+    size = max(_FEWEST, 2 ** math.ceil(math.log2(wavelength.size)))
+    return np.pad(wavelength, (0, size - wavelength.size), mode="edge")
+
+
+def combinations(
+    sky: SolvedSky, *axes: Float[np.ndarray, "n"]
+) -> Iterator[tuple[Float[np.ndarray, "ray"], ...]]:
+    """All combinations of numbers, the last axis fastest, as blocks of columns."""
+    shape = tuple(axis.size for axis in axes)
+    count, block = math.prod(shape), _block(sky)
+    for first in range(0, count, block):
+        places = np.unravel_index(np.arange(first, min(first + block, count)), shape)
+        yield tuple(axis[i] for axis, i in zip(axes, places, strict=True))
+
+
+def radiances(
+    sky: SolvedSky,
+    altitude: Float[np.ndarray, "ray"],
+    direction: Float[np.ndarray, "ray 3"],
+) -> Table:
+    """What one sees straight above the origin, for one block of `combinations`.
+
+    In W m^-2 sr^-1 nm^-1; altitudes in m.
+    """
+    return np.asarray(_radiances(sky, *_filled(sky, altitude, direction)))[
+        : altitude.size
+    ]
+
+
+def optical_depths(
+    sky: SolvedSky,
+    altitude: Float[np.ndarray, "ray"],
+    direction: Float[np.ndarray, "ray 3"],
+) -> Table:
+    """The optical depths to the ground or the top of the air, for such a block."""
+    return np.asarray(_depths(sky, *_filled(sky, altitude, direction)))[: altitude.size]
+
+
+def _block(sky: SolvedSky) -> int:
+    return max(16, _TOGETHER // sky.wavelength.size)
+
+
+def _filled(
+    sky: SolvedSky,
+    altitude: Float[np.ndarray, "ray"],
+    direction: Float[np.ndarray, "ray 3"],
+) -> tuple[np.ndarray, np.ndarray]:
+    """Positions and directions, the last ones again up to the size of a block."""
+    missing = ((0, _block(sky) - altitude.size), (0, 0))
+    position = altitude[:, None] * np.array([[0.0, 0.0, 1.0]])
+    dtype = sky.wavelength.dtype
+    return (
+        np.pad(position, missing, mode="edge").astype(dtype),
+        np.pad(direction, missing, mode="edge").astype(dtype),
+    )
+
+
+@eqx.filter_jit
+def _radiances(
+    sky: SolvedSky, position: Float[jax.Array, "n 3"], direction: Float[jax.Array, "n 3"]
+) -> Float[jax.Array, "n wl"]:
+    return jax.vmap(sky.radiance)(position, direction)
+
+
+@eqx.filter_jit
+def _depths(
+    sky: SolvedSky, position: Float[jax.Array, "n 3"], direction: Float[jax.Array, "n 3"]
+) -> Float[jax.Array, "n wl"]:
+    def depth(position: Position, direction: Direction) -> Radiance:
+        return optical_depth(sky.scene, position, direction, sky.wavelength)
+
+    return jax.vmap(depth)(position, direction)

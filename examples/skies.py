@@ -1,0 +1,49 @@
+"""Noon, sunset, a sunset on Mars, and the Earth from orbit: python examples/skies.py"""
+
+import pathlib
+import sys
+
+import jax.numpy as jnp
+
+from atmos import colour, deg, earth, image, km, mars, render, render_disks, solve
+from atmos.camera import LatLong, Perspective
+from atmos.light import SOLAR_RADIUS, Sun, sunlight
+from atmos.solver import SingleScattering
+
+
+WAVELENGTH = jnp.linspace(380.0, 780.0, 41)
+MARS = 1.524  # distance from the sun in au
+
+
+def skies(size):
+    """Names, scenes and cameras of pictures that are `size` pixels high."""
+    ground, orbit = jnp.array([0.0, 0.0, 2.0]), jnp.array([0.0, 0.0, 400 * km])
+    wide = lambda at, up, view: Perspective(at, 0.0, up, view, size, 3 * size // 2)
+
+    def under(world, zenith, distance=1.0):
+        spectrum = sunlight(10.0, distance)
+        return world(Sun.at(zenith, 0.0, spectrum, SOLAR_RADIUS / distance))
+
+    return [
+        ("noon", under(earth, 35 * deg), LatLong(ground, size)),
+        ("sunset", under(earth, 88.5 * deg), wide(ground, 14 * deg, 60 * deg)),
+        ("mars", under(mars, 86 * deg, MARS), wide(ground, 12 * deg, 50 * deg)),
+        ("orbit", under(earth, 62 * deg), wide(orbit, -18 * deg, 50 * deg)),
+    ]
+
+
+def main(folder, size):
+    """Writes the pictures into a folder and returns their XYZ."""
+    response = colour.response(WAVELENGTH)
+    pictures = {}
+    for name, scene, camera in skies(size):
+        sky = solve(scene, SingleScattering(7, 6, 14), WAVELENGTH)
+        air = render(sky, camera, response)
+        xyz = pictures[name] = air + render_disks(sky, camera, response)
+        exposure = colour.automatic_exposure(air)
+        image.write_png(folder / f"{name}.png", colour.preview(xyz, exposure))
+    return pictures
+
+
+if __name__ == "__main__":
+    main(pathlib.Path(sys.argv[1] if sys.argv[1:] else "."), 400)

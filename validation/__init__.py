@@ -1,0 +1,1 @@
+"""Claims of atmos against the outside world: peers, published tables, measurements."""
