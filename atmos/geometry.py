@@ -46,9 +46,9 @@ class AbstractPath(eqx.Module):
 
     @abc.abstractmethod
     def enter(self, top: Length) -> "AbstractPath":
-        """The same ray from where it falls below `top`; the whole of it, if it never does.
+        """The same ray from where it comes down to `top`; all of it, if it never does.
 
-        Exactly at `top`, however far away it started.
+        It then starts exactly at `top`, from however far away it came.
         """
 
     @abc.abstractmethod
@@ -118,7 +118,7 @@ class FlatPath(AbstractPath):
 
     @property
     def _slope(self) -> Number:
-        # A level ray would never leave the air; this one does so after a million depths.
+        # A level ray would never leave the air; this one does after a million depths.
         slope = self.direction[2]
         return jnp.where(
             jnp.abs(slope) < 1e-6, jnp.where(slope < 0, -1e-6, 1e-6), slope
@@ -201,8 +201,8 @@ class SphericalPath(AbstractPath):
 
     def enter(self, top: Length) -> "SphericalPath":
         start, r = self.start, self._from_centre
-        # How low it will come, from the sine and the cosine at the start: from space the
-        # sine has digits that one minus the square of the cosine has lost.
+        # How low it will come, from the sine and the cosine at the start: from space
+        # the sine has digits that one minus the square of the cosine has lost.
         across = jnp.cross(start.up, self.direction)
         squared = jnp.dot(across, across)
         aside = squared > 0.0

@@ -1,12 +1,13 @@
 """Many rays at once, in blocks of one shape: one compilation, and little memory."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import equinox as eqx
 import jax
+import jax.numpy as jnp
 import numpy as np
-from jaxtyping import ArrayLike, Float
+from jaxtyping import Array, ArrayLike, Float
 
 from .quantity import Direction, Position, Radiance
 from .solver import SolvedSky
@@ -14,7 +15,7 @@ from .transport import optical_depth
 
 
 _FEWEST = 16  # wavelengths that are worked on together
-_TOGETHER = 2**14  # rays times wavelengths in a block
+_TOGETHER = 2**11  # rays times wavelengths in a block: they fit into the cache
 
 Table = Float[np.ndarray, "ray wl"]
 
@@ -30,6 +31,27 @@ def direction(zenith: ArrayLike, azimuth: ArrayLike) -> Float[np.ndarray, "*n 3"
     return np.stack(np.broadcast_arrays(*parts), -1)
 
 
+def angles(towards: Float[np.ndarray, "3"]) -> tuple[float, float]:
+    """Zenith angle and azimuth of a direction, in degrees.
+
+    With no more decimals than it takes to make the direction of them again.
+    """
+    east, north, up = (float(x) for x in towards)
+    zenith = math.degrees(math.atan2(math.hypot(east, north), up))
+    azimuth = math.degrees(math.atan2(east, north)) % 360.0
+    shorter = lambda n: (round(zenith, n), round(azimuth, n))
+    return shorter(decimals(lambda n: direction(*shorter(n)), towards))
+
+
+def decimals(made: Callable[[int], ArrayLike], wanted: np.ndarray) -> int:
+    """The fewest decimals of numbers of which is made what is wanted, to rounding."""
+    near = np.finfo(wanted.dtype).eps * np.max(np.abs(wanted))
+    for count in range(3, 17):
+        if np.all(np.abs(made(count) - wanted) <= near):
+            return count
+    return 17
+
+
 def padded(wavelength: Float[np.ndarray, "wl"]) -> Float[np.ndarray, "more"]:
     """The wavelengths, and the last one again up to a power of two, 16 or more.
 
@@ -40,8 +62,8 @@ def padded(wavelength: Float[np.ndarray, "wl"]) -> Float[np.ndarray, "more"]:
 
 
 def combinations(
-    sky: SolvedSky, *axes: Float[np.ndarray, "n"]
-) -> Iterator[tuple[Float[np.ndarray, "ray"], ...]]:
+    sky: SolvedSky, *axes: np.ndarray
+) -> Iterator[tuple[np.ndarray, ...]]:
     """All combinations of numbers, the last axis fastest, as blocks of columns."""
     shape = tuple(axis.size for axis in axes)
     count, block = math.prod(shape), _block(sky)
@@ -59,9 +81,8 @@ def radiances(
 
     In W m^-2 sr^-1 nm^-1; altitudes in m.
     """
-    return np.asarray(_radiances(sky, *_filled(sky, altitude, direction)))[
-        : altitude.size
-    ]
+    found = _radiances(sky, *_filled(sky, altitude, direction))
+    return np.asarray(found)[: altitude.size]
 
 
 def optical_depths(
@@ -70,7 +91,8 @@ def optical_depths(
     direction: Float[np.ndarray, "ray 3"],
 ) -> Table:
     """The optical depths to the ground or the top of the air, for such a block."""
-    return np.asarray(_depths(sky, *_filled(sky, altitude, direction)))[: altitude.size]
+    found = _depths(sky, *_filled(sky, altitude, direction))
+    return np.asarray(found)[: altitude.size]
 
 
 def _block(sky: SolvedSky) -> int:
@@ -81,28 +103,32 @@ def _filled(
     sky: SolvedSky,
     altitude: Float[np.ndarray, "ray"],
     direction: Float[np.ndarray, "ray 3"],
-) -> tuple[np.ndarray, np.ndarray]:
+) -> tuple[Float[Array, "n 3"], Float[Array, "n 3"]]:
     """Positions and directions, the last ones again up to the size of a block."""
     missing = ((0, _block(sky) - altitude.size), (0, 0))
     position = altitude[:, None] * np.array([[0.0, 0.0, 1.0]])
     dtype = sky.wavelength.dtype
     return (
-        np.pad(position, missing, mode="edge").astype(dtype),
-        np.pad(direction, missing, mode="edge").astype(dtype),
+        jnp.asarray(np.pad(position, missing, mode="edge"), dtype),
+        jnp.asarray(np.pad(direction, missing, mode="edge"), dtype),
     )
 
 
 @eqx.filter_jit
 def _radiances(
-    sky: SolvedSky, position: Float[jax.Array, "n 3"], direction: Float[jax.Array, "n 3"]
-) -> Float[jax.Array, "n wl"]:
+    sky: SolvedSky,
+    position: Float[Array, "n 3"],
+    direction: Float[Array, "n 3"],
+) -> Float[Array, "n wl"]:
     return jax.vmap(sky.radiance)(position, direction)
 
 
 @eqx.filter_jit
 def _depths(
-    sky: SolvedSky, position: Float[jax.Array, "n 3"], direction: Float[jax.Array, "n 3"]
-) -> Float[jax.Array, "n wl"]:
+    sky: SolvedSky,
+    position: Float[Array, "n 3"],
+    direction: Float[Array, "n 3"],
+) -> Float[Array, "n wl"]:
     def depth(position: Position, direction: Direction) -> Radiance:
         return optical_depth(sky.scene, position, direction, sky.wavelength)
 

@@ -70,6 +70,12 @@ def rgb_tables(name: str) -> RGBTables:
     return RGBTables(*(tables[f"{name} {part}"] for part in RGBTables._fields))
 
 
+def cache_folder() -> pathlib.Path:
+    """Where things are kept that can be made again; it need not exist."""
+    chosen = os.environ.get("ATMOS_CACHE")
+    return pathlib.Path(chosen or platformdirs.user_cache_dir("atmos"))
+
+
 @ft.cache
 def _tables() -> dict[str, np.ndarray]:
     file = _file()
@@ -84,9 +90,8 @@ def _tables() -> dict[str, np.ndarray]:
 
 
 def _file() -> pathlib.Path:
-    folder = os.environ.get("ATMOS_CACHE") or platformdirs.user_cache_dir("atmos")
     version = importlib.metadata.version("colour-science")
-    return pathlib.Path(folder) / f"colour-science-{version}-{_EDITION}.npz"
+    return cache_folder() / f"colour-science-{version}-{_EDITION}.npz"
 
 
 def _load(file: pathlib.Path) -> dict[str, np.ndarray] | None:
@@ -115,8 +120,10 @@ def _save(file: pathlib.Path, tables: dict[str, np.ndarray]) -> None:
 
 
 def _read() -> dict[str, np.ndarray]:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # about matplotlib, which no table needs
+    # The package warns about matplotlib, which no table needs, and changes how NumPy
+    # prints numbers.
+    with warnings.catch_warnings(), np.printoptions():
+        warnings.simplefilter("ignore")
         import colour
         from colour.adaptation import matrix_chromatic_adaptation_VonKries
         from colour.plotting.datasets.astm_g_173 import SD_ASTMG173_ETR

@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
-from .geometry import AbstractPath, Point
+from .geometry import AbstractPath
 from .light import Sun
 from .medium import AbstractProfile
 from .quantity import (
@@ -98,7 +98,7 @@ def enter(
 ) -> tuple[AbstractPath, Length, Bool[Array, ""]]:
     """The ray from where it enters the air, its length there, and if it ends grounded.
 
-    An observer above the air is moved to its top, so that no digits are lost on the way.
+    An observer above the air is moved to its top: no digits are lost on the way.
     """
     path = scene.geometry.path(scene.geometry.locate(position), direction)
     path = path.enter(scene.top)
@@ -136,7 +136,7 @@ def transmittance(
     *,
     nodes: int = FINE,
 ) -> Fraction:
-    """The share of light from beyond the air that arrives here; 0 through the ground."""
+    """The share of light from beyond the air that arrives; 0 through the ground."""
     _, _, grounded = enter(scene, position, direction)
     depth = optical_depth(scene, position, direction, wavelength, nodes=nodes)
     return jnp.where(grounded, 0.0, jnp.exp(-depth))
@@ -147,7 +147,7 @@ def direct_irradiance(
 ) -> Irradiance:
     """What a plane facing the sun receives from its disk, through the air.
 
-    In W m^-2 nm^-1. The air weakens the disk strip by strip, and the horizon may cut it.
+    In W m^-2 nm^-1. The air weakens the disk strip by strip; the horizon may cut it.
     """
     here = scene.geometry.locate(position)
     rise = jnp.dot(here.up, sun.direction)

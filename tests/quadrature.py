@@ -1,7 +1,7 @@
 """Single scattering worked out the slow way, to judge the quick one by.
 
-Nothing is shared with the package: places are distances from the planet's centre, the way
-along a ray is counted from where it is nearest to the centre, edges are found by
+Nothing is shared with the package: places are distances from the planet's centre, the
+way along a ray is counted from where it is nearest to the centre, edges are found by
 bisection, and sums are taken by tanh-sinh (along the view) and by Gauss in many panels
 (on the way to the sun). The world: air, dust and ozone under a sun of unit irradiance.
 """
@@ -41,24 +41,23 @@ def extinctions(wavelength):
 
 
 def columns(nearest, begin, end):
-    """From `begin` to `end` (counted from the nearest place) on rays of that altitude."""
-    distance = RADIUS + nearest
-    away = (_LEVELS - nearest[..., None]) * (
-        _LEVELS + nearest[..., None] + 2.0 * RADIUS
-    )
+    """From `begin` to `end`, counted from the nearest place, given its altitude."""
+    away = (_LEVELS - nearest[:, None]) * (_LEVELS + nearest[:, None] + 2.0 * RADIUS)
     away = np.sqrt(np.maximum(away, 0.0))
-    edges = np.concatenate([-away[..., ::-1], away], -1)
-    edges = np.clip(edges, begin[..., None], np.maximum(end, begin)[..., None])
-    edges = np.concatenate(
-        [begin[..., None], edges, np.maximum(end, begin)[..., None]], -1
-    )
-    middle, half = 0.5 * (edges[..., 1:] + edges[..., :-1]), 0.5 * np.diff(edges)
+    begin, end = begin[:, None], np.maximum(end, begin)[:, None]
+    edges = np.concatenate([-away[:, ::-1], away], 1)
+    edges = np.concatenate([begin, np.clip(edges, begin, end), end], 1)
+    middle, half = 0.5 * (edges[:, 1:] + edges[:, :-1]), 0.5 * np.diff(edges)
+    ray, panel = np.nonzero(half)
+    middle, half = middle[ray, panel][:, None], half[ray, panel][:, None]
     nodes, weights = _GAUSS
-    x = middle[..., None] + half[..., None] * nodes
-    b = distance[..., None, None]
-    altitude = nearest[..., None, None] + x * x / (b + np.sqrt(b * b + x * x))
-    found = densities(altitude) * (half[..., None] * weights)[..., None]
-    return found.sum((-2, -3))
+    x, b = middle + half * nodes, RADIUS + nearest[ray][:, None]
+    altitude = nearest[ray][:, None] + x * x / (b + np.sqrt(b * b + x * x))
+    total = np.zeros((len(nearest), 3))
+    np.add.at(
+        total, ray, np.einsum("pnm,n,p->pm", densities(altitude), weights, half[:, 0])
+    )
+    return total
 
 
 def _edges(function, x):
@@ -79,8 +78,6 @@ def gather(altitude, view, sun):
     Columns from the eye over each scattering place to the sun, and the amounts of what
     scatters there; the same for the ground (columns and cosine), if it is seen and lit.
     """
-    view, sun = np.asarray(view, float), np.asarray(sun, float)
-    view, sun = view / np.linalg.norm(view), sun / np.linalg.norm(sun)
     nothing = np.zeros((0, 3)), np.zeros((0, 3)), None
     r, level = RADIUS + altitude, np.hypot(view[0], view[1])
     start = r * view[2]
@@ -140,17 +137,23 @@ def phases(cosine):
     return np.stack([3.0 / (16.0 * np.pi) * (1.0 + cosine**2), dust], -1)
 
 
-def radiance(altitude, view, sun, wavelength, present=(1.0, 1.0, 1.0)):
-    """The light that turned once, with so much of air, dust and ozone."""
-    ways, amounts, ground = gather(altitude, view, sun)
-    extinction = extinctions(np.asarray(wavelength, float)) * np.asarray(present)
-    scattering = extinction[:, :2] * [1.0, SHARE]
-    cosine = np.dot(view, sun) / np.linalg.norm(view) / np.linalg.norm(sun)
-    arrives = np.exp(-ways @ extinction.T)
-    total = np.einsum(
-        "pm,pl,lm,m->l", amounts[:, :2], arrives, scattering, phases(cosine)
-    )
-    if ground is not None:
-        way, rise = ground
-        total += ALBEDO / np.pi * rise * np.exp(-way @ extinction.T)[0]
-    return total
+WORLDS = {"pure": (1, 0, 0), "hazy": (1, 1, 0), "full": (1, 1, 1)}
+
+
+def radiances(altitudes, views, suns, wavelength, worlds=WORLDS):
+    """The light that turned once, in worlds with so much of air, dust and ozone."""
+    found = {name: [] for name in worlds}
+    views, suns = np.asarray(views, float), np.asarray(suns, float)
+    for altitude, view, sun in zip(altitudes, views, suns, strict=True):
+        view, sun = (x / np.linalg.norm(x) for x in (view, sun))
+        ways, amounts, ground = gather(altitude, view, sun)
+        for name, present in worlds.items():
+            extinction = extinctions(wavelength) * np.asarray(present, float)
+            scattering = extinction[:, :2] * [1.0, SHARE] * phases(view @ sun)
+            arrives = np.exp(-ways @ extinction.T)
+            total = np.einsum("pm,pl,lm->l", amounts[:, :2], arrives, scattering)
+            if ground is not None:
+                way, rise = ground
+                total += ALBEDO / np.pi * rise * np.exp(-way @ extinction.T)[0]
+            found[name].append(total)
+    return {name: np.array(total) for name, total in found.items()}

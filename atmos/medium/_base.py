@@ -9,7 +9,7 @@ from jaxtyping import Array, ArrayLike, Float
 
 from ..geometry import AbstractPath, Point
 from ..phase import AbstractPhaseFunction, Isotropic
-from ..quantity import Length, Number, Spectral, Wavelength
+from ..quantity import Number, Spectral, Wavelength
 from ..spectrum import AbstractSpectrum, as_spectrum, Complement, Product
 
 
@@ -57,8 +57,8 @@ def _maybe(x: ArrayLike | AbstractSpectrum | None) -> AbstractSpectrum | None:
 class Medium(eqx.Module):
     """One kind of stuff in the air. A scene holds several; their effects add.
 
-    `scattering` and `absorption` are coefficients in m^-1 where `profile` is 1. A medium
-    that only absorbs has no `scattering`: solvers then do not look for its light.
+    `scattering` and `absorption` are coefficients in m^-1 where `profile` is 1. A
+    medium that only absorbs has no `scattering`: solvers do not look for its light.
     """
 
     profile: AbstractProfile

@@ -11,8 +11,8 @@ from ._base import AbstractProfile, check_above_zero, check_not_negative
 class Grid(AbstractProfile):
     """Values at the centres of equal cells in the box from `lower` to `upper`, in m.
 
-    Between the centres it is trilinear, in the outermost half cells constant, and outside
-    the box 0.
+    Between the centres it is trilinear, in the outermost half cells constant, and
+    outside the box 0.
     """
 
     values: Float[Array, "nx ny nz"] = eqx.field(converter=as_float)

@@ -9,8 +9,8 @@ from ..quantity import Number
 from ._base import AbstractProfile, crossings
 
 
-# US Standard Atmosphere 1976, tables 2 and 4: the geopotential altitudes (m) at which the
-# lapse rate (K/m) changes; above the last the air goes on with the same temperature.
+# US Standard Atmosphere 1976, tables 2 and 4: the geopotential altitudes (m) at which
+# the lapse rate (K/m) changes; above the last the air goes on at the same temperature.
 _BASE = np.array([0.0, 11e3, 20e3, 32e3, 47e3, 51e3, 71e3, 84.852e3])
 _LAPSE = np.array([-6.5e-3, 0.0, 1e-3, 2.8e-3, 0.0, -2.8e-3, -2e-3, 0.0])
 _RADIUS = 6_356_766.0  # m, effective

@@ -13,17 +13,19 @@ from ..transport import columns, cumulative, enter, extinctions, gauss_legendre
 from ._base import AbstractSolver
 
 
-# Light from beyond this optical depth is lost: it is 1e-13 of what comes from nearer.
-_OPAQUE = 30.0
+# Where the clearest light has met these optical depths a ray is cut, as light changes
+# fast up to there. From beyond the last it is lost: 1e-13 of what comes from nearer.
+_DEPTHS = (2.0, 7.5, 30.0)
 
 
 class SingleScattering(AbstractSolver):
     """Light that turned once on its way, in the air or on the ground.
 
-    A ray is cut where a medium, or the light that falls on it, is not smooth: at edges of
-    media, and where the sun's rays have grazed the planet or such an edge. Each piece takes
-    `nodes` places by Gauss and Legendre, and so does each piece of the way from there to
-    the sun with `light_nodes`. Of more than `pieces`, neighbours are joined.
+    A ray is cut where a medium, or the light that falls on it, is not smooth: at edges
+    of media, and where the sun's rays have grazed the planet or such an edge. Each piece
+    takes `nodes` places by Gauss and Legendre, and so does each piece of the way from
+    there to the sun with `light_nodes`. Of more than `pieces`, the shortest join a
+    neighbour.
     """
 
     nodes: int = eqx.field(static=True, default=8)
@@ -97,32 +99,39 @@ class SingleScattering(AbstractSolver):
         path: AbstractPath,
         far: Length,
         extinction: Float[Array, "medium wl"],
-    ) -> Length:
-        """How far one sees: to `far`, or somewhat past where the clearest light is lost."""
+    ) -> Float[Array, "depth"]:
+        """How far one sees until so much is lost, or somewhat past it; at most to `far`."""
         fixed, whole, extinction = jax.lax.stop_gradient((path, far, extinction))
+        limits = jnp.array(_DEPTHS, whole.dtype)
 
-        def opaque(halvings):
+        def depth(halvings):
             found = columns(scene, fixed, whole * jnp.exp2(-halvings), nodes=4)
             depth = _sum("m,ml->l", jax.lax.stop_gradient(found), extinction)
-            return jnp.min(depth, initial=math.inf) > _OPAQUE
+            return jnp.min(depth, initial=math.inf)
 
         def closer(_, bounds):
             yes, no = bounds
             middle = 0.5 * (yes + no)
-            found = opaque(middle)
+            found = jax.vmap(depth)(middle) > limits
             return jnp.where(found, middle, yes), jnp.where(found, no, middle)
 
-        start = jnp.zeros_like(whole), jnp.full_like(whole, 40.0)
+        start = jnp.zeros_like(limits), jnp.full_like(limits, 40.0)
         halvings, _ = jax.lax.fori_loop(0, 7, closer, start)
         return far * jnp.exp2(-halvings)
 
     def _cut(
-        self, scene: Scene, light: Sun, path: AbstractPath, seen: Length
+        self,
+        scene: Scene,
+        light: Sun,
+        path: AbstractPath,
+        seen: Float[Array, "depth"],
     ) -> tuple[Float[Array, "piece"], Float[Array, "piece"], Bool[Array, "piece"]]:
-        """Where the pieces of a ray begin, their lengths, and which lie in the light."""
+        """Where the pieces of a ray begin, their lengths, which of them lie in light."""
         graze = lambda altitude: path.shadow(light.direction, altitude)
         # Close by, the light of a thick medium changes faster than the medium itself.
-        edges = [seen * jnp.array([0.0, 0.0625, 0.25, 1.0], seen.dtype)]
+        shares = jnp.array([0.0625, 0.25, 1.0], seen.dtype)
+        close, seen = jnp.minimum(seen, shares * seen[-1]), seen[-1]
+        edges = [jnp.zeros_like(close[:1]), close]
         for x in scene.media:
             levels = x.profile.levels.astype(seen.dtype)
             edges += [x.profile.breaks(path), jax.vmap(graze)(levels).ravel()]
@@ -135,16 +144,10 @@ class SingleScattering(AbstractSolver):
 
 
 def _join(edges: Float[Array, "edge"], pieces: int) -> Float[Array, "cut"]:
-    """All edges that differ, if they make no more than `pieces`; else one in so many."""
-    differs = jnp.diff(edges) > 1e-6 * edges[-1]
-    rank = jnp.concatenate(
-        [jnp.zeros_like(edges[:1]), jnp.cumsum(differs.astype(edges.dtype))]
-    )
-    wanted = jnp.arange(pieces + 1, dtype=edges.dtype) * jnp.maximum(
-        rank[-1] / pieces, 1.0
-    )
-    late = rank[None, :] >= wanted[:, None] - 0.5
-    return jnp.min(jnp.where(late, edges[None, :], edges[-1]), 1)
+    """The edges of the longest `pieces`; what is shorter goes with its neighbour."""
+    lengths = jnp.diff(edges)
+    longest = jnp.sort(jnp.argsort(-lengths)[:pieces])
+    return jnp.concatenate([edges[:1], edges[longest[1:]], edges[-1:]])
 
 
 def _sum(product: str, *terms: Array) -> Array:

@@ -1,0 +1,10 @@
+"""A scene as a TOML file, read strictly, and written so that it reads back the same.
+
+Lengths are in m, wavelengths in nm, coefficients in m^-1, angles in degrees. What the
+tables may hold is what the classes here say; their words, and what they mean, are those
+of `atmos.medium`, `atmos.phase` and `atmos.spectrum`.
+"""
+
+from ._read import load as load, parse as parse
+from ._scene import opac as opac
+from ._write import dump as dump, GUIDE as GUIDE

@@ -1,0 +1,161 @@
+import dataclasses
+from typing import Annotated, Literal
+
+import msgspec
+
+from .. import light, medium, particle, phase, spectrum
+from ..geometry import AbstractGeometry, Flat, Spherical
+from ..particle import aerosol, surface
+from ..quantity import deg
+from ..rays import direction
+from ..scene import air, haze, ozone, Scene
+from ._base import Above0, AtLeast0, build, Table, within
+from ._errors import refuse, under
+from ._phases import Phase
+from ._profiles import Profile
+from ._spectra import Constant, Molecules, Ozone, PowerLaw, Solar, Spectrum, Tabulated
+
+
+class Planet(Table, kw_only=True):
+    shape: Literal["spherical", "flat"]
+    radius: Above0 | None = None
+    top: Above0
+    ground_albedo: float | str | Constant | PowerLaw | Tabulated = 0.0
+
+    def geometry(self) -> AbstractGeometry:
+        if self.shape == "flat":
+            return Flat()
+        if self.radius is None:
+            refuse("radius", "is missing; a spherical planet needs one, in m")
+        if self.radius < self.top:
+            refuse("radius", f"must be above `top`, {self.top} m", self.radius)
+        return Spherical(self.radius)
+
+    def ground(self) -> spectrum.AbstractSpectrum:
+        if not isinstance(self.ground_albedo, str):
+            return within("ground_albedo", self.ground_albedo, 0.0, 1.0)
+        if self.ground_albedo not in surface.NAMES:
+            names = ", ".join(surface.NAMES)
+            refuse("ground_albedo", f"must be one of {names}", self.ground_albedo)
+        return surface.albedo(self.ground_albedo)
+
+
+class Sun(Table, kw_only=True):
+    zenith: Annotated[float, msgspec.Meta(ge=0, le=180)]
+    azimuth: float = 0.0
+    irradiance: Spectrum | Solar
+    angular_radius: Annotated[float, msgspec.Meta(ge=0, lt=90)] = (
+        light.SOLAR_RADIUS / deg
+    )
+
+    def build(self) -> light.Sun:
+        irradiance = within("irradiance", self.irradiance, 0.0)
+        towards = direction(self.zenith, self.azimuth)
+        return light.Sun(towards, irradiance, self.angular_radius * deg)
+
+
+class Medium(Table):
+    """Either a `preset`, or a profile, coefficients where it is 1, and a phase."""
+
+    name: str | None = None
+    scattering: Spectrum | Molecules | None = None
+    absorption: Spectrum | Ozone | None = None
+    extinction: Spectrum | None = None
+    single_scattering_albedo: Spectrum | None = None
+    profile: Profile | None = None
+    phase: Phase | None = None
+    preset: str | None = None
+    column: AtLeast0 | None = None
+    optical_depth: AtLeast0 | None = None
+    visibility: Above0 | None = None
+
+    def build(self) -> medium.Medium:
+        if self.preset is not None:
+            return self._ready_made(self.preset)
+        self._alone("column", "optical_depth", "visibility", beside="no `preset`")
+        if self.profile is None:
+            refuse("profile", "is missing")
+        profile = build("profile", self.profile)
+        shape = None if self.phase is None else build("phase", self.phase)
+        scatters = self.scattering is not None or self.extinction is not None
+        if scatters and shape is None:
+            refuse("phase", "is missing; whatever scatters needs one")
+        if self.extinction is not None:
+            self._alone("scattering", "absorption", beside="`extinction`")
+            albedo = self.single_scattering_albedo
+            if albedo is None:
+                refuse("single_scattering_albedo", "is missing beside `extinction`")
+            albedo = within("single_scattering_albedo", albedo, 0.0, 1.0)
+            extinction = within("extinction", self.extinction, 0.0)
+            assert shape is not None
+            return medium.of_extinction(extinction, albedo, profile, shape)
+        self._alone("single_scattering_albedo", beside="no `extinction`")
+        parts = {
+            name: within(name, value, 0.0)
+            for name in ("scattering", "absorption")
+            if (value := getattr(self, name)) is not None
+        }
+        if not parts:
+            refuse("scattering", "is missing, and so are `absorption`, `extinction`")
+        return medium.Medium(profile, **parts, phase=shape or phase.Isotropic())
+
+    def _ready_made(self, preset: str) -> medium.Medium:
+        own = {"air": (), "ozone": ("column",)}
+        own = own.get(preset, ("optical_depth", "visibility"))
+        free = {"name", "preset", *own}
+        others = [x for x in self.__struct_fields__ if x not in free]
+        self._alone(*others, beside=f'`preset = "{preset}"`')
+        if preset == "air":
+            return air()
+        if preset == "ozone":
+            return ozone(300.0 if self.column is None else self.column)
+        if preset not in aerosol.NAMES:
+            names = ", ".join(["air", "ozone", *aerosol.NAMES])
+            refuse("preset", f"must be one of {names}", preset)
+        return haze(opac(preset, self.optical_depth, self.visibility))
+
+    def _alone(self, *names: str, beside: str) -> None:
+        for name in names:
+            if getattr(self, name) is not None:
+                refuse(name, f"must not stand beside {beside}")
+
+
+class File(Table):
+    planet: Planet
+    sun: Sun | list[Sun]
+    medium: list[Medium] = []
+
+    def build(self) -> Scene:
+        suns = {"sun": self.sun}
+        if isinstance(self.sun, list):
+            suns = {f"sun[{i}]": x for i, x in enumerate(self.sun)}
+        media = {f"medium[{i}]": x for i, x in enumerate(self.medium)}
+        with under("planet"):
+            geometry, ground = self.planet.geometry(), self.planet.ground()
+        return Scene(
+            geometry,
+            self.planet.top,
+            tuple(build(key, x) for key, x in media.items()),
+            tuple(build(key, x) for key, x in suns.items()),
+            ground,
+        )
+
+
+def opac(
+    name: str, optical_depth: float | None = None, visibility: float | None = None
+) -> particle.Aerosol:
+    """An aerosol of OPAC, of which there is as much as one of the two says.
+
+    The optical depth is that at 550 nm, the visibility is in m. Raises `ValueError` for
+    an unknown name, for both, and for an amount out of range.
+    """
+    found = aerosol.opac(name)
+    if optical_depth is not None and visibility is not None:
+        refuse("visibility", "must not stand beside `optical_depth`")
+    if visibility is not None:
+        amount = aerosol.optical_depth(visibility, found.scale_height)
+    elif optical_depth is not None:
+        amount = optical_depth
+    else:
+        return found
+    return dataclasses.replace(found, optical_depth=amount)

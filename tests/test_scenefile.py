@@ -1,0 +1,350 @@
+import dataclasses
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from atmos import deg, earth, km, mars, medium, phase, Scene, spectrum
+from atmos.geometry import Flat, Spherical
+from atmos.light import Sun, sunlight
+from atmos.particle import Air, CarbonDioxide, Depolarisation, Scattering
+from atmos.particle.aerosol import opac, optical_depth
+from atmos.particle.surface import albedo
+from atmos.scene import air, haze, ozone
+from atmos.scenefile import dump, GUIDE, load, parse
+
+
+PLANET = """
+[planet]
+shape = "spherical"
+radius = 6360e3
+top = 60e3
+ground_albedo = 0.1
+"""
+SUN = """
+[sun]
+zenith = 60.0
+irradiance = 1.0
+angular_radius = 0.0
+"""
+AIR = """
+[[medium]]
+name = "air"
+scattering = { kind = "power_law", value = 1e-6, exponent = -4.0, at = 1000.0 }
+profile = { kind = "exponential", scale_height = 8000.0 }
+phase = { kind = "rayleigh", depolarisation = 0.0 }
+"""
+HAZE = """
+[[medium]]
+single_scattering_albedo = 0.75
+profile = { kind = "uniform", bottom = 0, top = 1200 }
+phase = { kind = "henyey_greenstein", g = 0.76 }
+[medium.extinction]
+kind = "table"
+wavelength = [400, 600, 800]
+value = [4e-5, 2e-5, 1e-5]
+"""
+TEXT = PLANET + SUN + AIR + HAZE
+
+
+def alike(a, b):
+    """Whether two scenes are one but for rounding."""
+    assert jax.tree.structure(a) == jax.tree.structure(b)
+    for x, y in zip(jax.tree.leaves(a), jax.tree.leaves(b), strict=True):
+        near = 2.0 * float(jnp.finfo(x.dtype).eps)
+        np.testing.assert_allclose(x, y, rtol=near, atol=near if x.ndim else 0.0)
+
+
+def test_a_scene_file_says_what_the_air_is():
+    found = parse(TEXT)
+    wavelength = jnp.array([500.0, 700.0])
+    clear, haze = found.media
+    np.testing.assert_allclose(clear.extinction(wavelength)[0], 1e-6 * 2**4)
+    np.testing.assert_allclose(haze.extinction(wavelength), [3e-5, 1.5e-5])
+    assert haze.scattering is not None
+    np.testing.assert_allclose(
+        haze.scattering.evaluate(wavelength), [2.25e-5, 1.125e-5]
+    )
+    assert isinstance(haze.profile, medium.Uniform) and haze.profile.top == 1200.0
+    assert isinstance(clear.profile, medium.Exponential)
+    assert isinstance(clear.phase, phase.Rayleigh)
+    assert isinstance(found.geometry, Spherical) and found.geometry.radius == 6360e3
+    assert found.ground.evaluate(wavelength) == 0.1
+
+
+def test_the_sun_stands_where_the_file_says():
+    text = TEXT.replace("zenith = 60.0", "zenith = 60.0\nazimuth = 90.0")
+    np.testing.assert_allclose(
+        parse(text).lights[0].direction, [np.sqrt(0.75), 0.0, 0.5], atol=1e-15
+    )
+
+
+def test_a_flat_planet_needs_no_radius():
+    text = TEXT.replace('"spherical"', '"flat"').replace("radius = 6360e3\n", "")
+    assert isinstance(parse(text).geometry, Flat)
+
+
+def test_a_ready_made_medium_is_that_of_the_library():
+    text = """
+[[medium]]
+preset = "air"
+[[medium]]
+preset = "ozone"
+column = 250
+[[medium]]
+preset = "desert"
+visibility = 20e3
+[[medium]]
+preset = "urban"
+optical_depth = 0.2
+[[medium]]
+preset = "arctic"
+"""
+    desert, urban = opac("desert"), opac("urban")
+    amount = optical_depth(20e3, desert.scale_height)
+    wanted = (
+        air(),
+        ozone(250.0),
+        haze(dataclasses.replace(desert, optical_depth=amount)),
+        haze(dataclasses.replace(urban, optical_depth=0.2)),
+        haze(opac("arctic")),
+    )
+    alike(parse(PLANET + SUN + text).media, wanted)
+
+
+def row(*numbers):
+    return np.array(numbers)
+
+
+def table(knots, values, *beyond):
+    return spectrum.Tabulated(row(*knots), row(*values), *beyond)
+
+
+SUNLIT = Sun.at(50.0 * deg, 200.0 * deg, sunlight(5.0, 1.0163))
+STAR = spectrum.BandAverage(row(300.0, 400.0, 900.0), row(1.0, 2.0, 1.0), 5.0)
+SHARE = table([300.0, 500.0, 900.0], [0.1, 0.7, 0.3])
+SLAB = medium.Uniform(0.0, 1e3)
+MEDIA = [
+    medium.Medium(medium.Tent(25 * km, 15 * km), absorption=SHARE),
+    medium.Medium(
+        medium.Tabulated(row(0.0, 1e3, 5e3), row(1.0, 0.5, 0.0)),
+        scattering=spectrum.PowerLaw(1e-5, -1.3),
+        absorption=table([400.0, 700.0], [1e-6, 2e-6], 0.0, 0.0),
+        phase=phase.Isotropic(),
+    ),
+    medium.of_extinction(
+        spectrum.PowerLaw(1e-5, -0.5),
+        SHARE,
+        medium.Ball(row(1.0, 2.0, 300.0), 100.0),
+        phase.CornetteShanks(0.5),
+    ),
+    medium.Medium(
+        medium.Grid(
+            np.arange(24.0).reshape(2, 3, 4), row(0.0, 0.0, 1.0), row(1.0, 2.0, 3.0)
+        ),
+        scattering=1e-3,
+        phase=phase.Draine(spectrum.as_spectrum(0.4), SHARE),
+    ),
+    medium.Medium(
+        medium.StandardAtmosphere(),
+        scattering=Scattering(Air(420e-6)),
+        phase=phase.Rayleigh(Depolarisation(CarbonDioxide())),
+    ),
+    medium.Medium(
+        SLAB,
+        scattering=table([400.0, 700.0], [1e-6, 2e-6], None, 1e-6),
+        phase=phase.EmpiricalMie.hazy(),
+    ),
+    medium.Medium(
+        SLAB,
+        scattering=2e-5,
+        phase=phase.Tabulated(row(-1.0, 0.2, 0.999, 1.0), row(1.0, 2.0, 30.0, 5e3)),
+    ),
+    medium.Medium(
+        SLAB,
+        scattering=2e-5,
+        phase=phase.Tabulated(
+            row(-1.0, 0.5, 1.0),
+            np.array([[1.0, 2.0], [2.0, 3.0], [7.0, 9.0]]),
+            row(400.0, 800.0),
+        ),
+    ),
+    medium.Medium(
+        medium.Exponential(8 * km),
+        scattering=2e-5,
+        phase=phase.DoubleHenyeyGreenstein(
+            spectrum.as_spectrum(0.9), spectrum.as_spectrum(-0.5), SHARE
+        ),
+    ),
+]
+SCENES = {
+    "earth": earth(SUNLIT),
+    "mars": mars(SUNLIT),
+    "every medium": Scene(Flat(), 50 * km, tuple(MEDIA), (SUNLIT,), SHARE),
+    "two suns": Scene(
+        Spherical(6360 * km),
+        60 * km,
+        (),
+        (SUNLIT, Sun.at(1.0, 2.0, spectrum.as_spectrum(0.1), 0.0)),
+        albedo("snow"),
+    ),
+    "no sun": Scene(Flat(), 1 * km, (air(),), ()),
+    "another star": Scene(Flat(), 1 * km, (air(),), (Sun.at(1.0, 0.0, STAR),)),
+}
+
+
+@pytest.mark.parametrize("scene", SCENES.values(), ids=SCENES)
+@pytest.mark.parametrize("dtype", [jnp.float64, jnp.float32])
+def test_what_is_written_is_read_again(scene, dtype):
+    scene = jax.tree.map(lambda x: x.astype(dtype), scene)
+    found = parse(dump(scene))
+    alike(jax.tree.map(lambda x: x.astype(dtype), found), scene)
+
+
+def test_the_sun_and_the_ground_are_written_by_name():
+    text = dump(SCENES["earth"], ["air", "ozone", "haze"])
+    assert 'irradiance = { kind = "solar", bandwidth = 5.0, distance = 1.0163 }' in text
+    assert 'ground_albedo = "grass"' in text
+    assert "zenith = 50.0\n" in text and "azimuth = 200.0\n" in text
+    assert 'name = "haze"' in text
+    assert len(text) < 1500
+
+
+def test_the_guide_names_every_kind():
+    kinds = """exponential tent uniform table standard_atmosphere ball grid isotropic
+    rayleigh henyey_greenstein double_henyey_greenstein cornette_shanks draine
+    empirical_mie power_law molecules ozone solar""".split()
+    assert all(f'kind = "{x}"' in GUIDE for x in kinds)
+    assert parse(GUIDE + TEXT).top == 60e3
+
+
+def test_a_scene_that_has_no_words_is_not_written():
+    mixed = spectrum.Product(SHARE, SHARE)
+    odd = medium.Medium(medium.Exponential(8 * km), absorption=mixed)
+    with pytest.raises(ValueError, match=r"media\[0\].absorption"):
+        dump(Scene(Flat(), 1 * km, (odd,), ()))
+
+
+def changed(old, new):
+    assert old in TEXT
+    return TEXT.replace(old, new, 1)
+
+
+PHASE = '{ kind = "rayleigh", depolarisation = 0.0 }'
+PROFILE = '{ kind = "exponential", scale_height = 8000.0 }'
+BAD = [
+    ("top = 60e3", "top = 60e3\nhue = 3", "`planet.hue` is not known", "ground_albedo"),
+    ("[planet]", "[plant]", "`plant` is not known", "sun, medium"),
+    ("radius = 6360e3", "", "`planet.radius` is missing", "m"),
+    (
+        "radius = 6360e3",
+        "radius = -6360e3",
+        "`planet.radius`",
+        "above 0; got -6360000.0",
+    ),
+    ("radius = 6360e3", "radius = 6360", "`planet.radius`", "above `top`, 60000.0 m"),
+    ("6360e3", '"6360 km"', "`planet.radius` must be a number", "got '6360 km'"),
+    ("6360e3", "nan", "`planet.radius` must be a finite number", "got nan"),
+    ("6360e3", "inf", "`planet.radius` must be a finite number", "got inf"),
+    ("6360e3", "1e999", "`planet.radius` must be a finite number", "got inf"),
+    ("6360e3", "1" * 400, "`planet.radius` must be a finite number", "got 111"),
+    ("6360e3", "true", "`planet.radius` must be a number", "got True"),
+    ("6360e3", "1979-05-27", "`planet.radius` must be a number", "1979"),
+    ('"spherical"', '"round"', "`planet.shape` must be one of", "got 'round'"),
+    ("top = 60e3", "top = 0", "`planet.top` must be a number above 0", "got 0"),
+    ("albedo = 0.1", "albedo = 1.1", "`planet.ground_albedo` must be", "got 1.1."),
+    ("albedo = 0.1", 'albedo = "gras"', "must be one of grass", "got 'gras'"),
+    ("albedo = 0.1", 'albedo = {kind = "solar"}', "ground_albedo.kind`", "got 'solar'"),
+    (
+        "albedo = 0.1",
+        "albedo = {value = 3}",
+        "`planet.ground_albedo.kind` is missing",
+        "",
+    ),
+    ("zenith = 60.0", "zenith = 190", "`sun.zenith`", "180 or less; got 190"),
+    ("zenith = 60.0", "", "`sun.zenith` is missing", ""),
+    ("irradiance = 1.0", "irradiance = -1.0", "`sun.irradiance` must be", "got -1.0"),
+    ("radius = 0.0", "radius = -0.1", "`sun.angular_radius`", "got -0.1"),
+    ("8000.0", "-8000.0", "`medium[0].profile.scale_height`", "above 0; got -8000.0"),
+    ("8000.0", "0", "`medium[0].profile.scale_height`", "above 0; got 0"),
+    (PROFILE, "3", "`medium[0].profile` must be a table", "got 3"),
+    ('"exponential"', '"cone"', "`medium[0].profile.kind` must be one", "got 'cone'"),
+    (
+        "top = 1200",
+        "top = -1",
+        "`medium[1].profile.top - bottom` must be above 0",
+        "-1",
+    ),
+    ("value = 1e-6", "value = -1e-6", "`medium[0].scattering` must be", "got -1e-06"),
+    ("at = 1000.0", "at = 1.0", "`medium[0].scattering.at`", "100 or more; got 1.0"),
+    ("[400, 600, 800]", "[400, 800, 600]", "`medium[1].extinction.wavelength`", "rise"),
+    ("[400, 600, 800]", "[0.4, 0.6, 0.8]", "extinction.wavelength[0]`", "got 0.4"),
+    ("[400, 600, 800]", "[400, 600]", "`medium[1].extinction.value` must pair", ""),
+    ("[4e-5, 2e-5", "[4e-5, -2e-5", "`medium[1].extinction` must be", "got -2e-05"),
+    ("[4e-5, 2e-5", '[4e-5, "a"', "`medium[1].extinction.value[1]`", "got 'a'"),
+    (
+        "albedo = 0.75",
+        "albedo = 1.5",
+        "`medium[1].single_scattering_albedo`",
+        "got 1.5",
+    ),
+    ("single_scattering_albedo = 0.75", "", "single_scattering_albedo` is missing", ""),
+    ("medium.extinction", "medium.scattering", "single_scattering_albedo`", "beside"),
+    ("g = 0.76", "g = 1.2", "`medium[1].phase.g` must be", "got 1.2"),
+    ("g = 0.76", "h = 0.76", "`medium[1].phase.h` is not known", "known there: g"),
+    (
+        "depolarisation = 0.0",
+        "depolarisation = 0.7",
+        "phase.depolarisation`",
+        "got 0.7",
+    ),
+    (f"phase = {PHASE}", "", "`medium[0].phase` is missing", ""),
+    (
+        PHASE,
+        '{ kind = "table", cosine = [-1, 0.9], value = [1, 1] }',
+        "`medium[0].phase.cosine` must rise from -1 to 1",
+        "0.9",
+    ),
+    (
+        PHASE,
+        '{ kind = "table", cosine = [-1, 1], value = [1, [1]] }',
+        "`medium[0].phase.value` must have rows",
+        "",
+    ),
+    ('name = "air"', 'preset = "air"', "`medium[0].scattering` must not", "beside"),
+    (
+        "[[medium]]",
+        '[[medium]]\npreset = "smog"\n[[medium]]',
+        "medium[0].preset`",
+        "smog",
+    ),
+    (
+        "[[medium]]",
+        '[[medium]]\npreset = "desert"\nvisibility = 400e3\n[[medium]]',
+        "`medium[0].visibility` must be below",
+        "got 400000.0",
+    ),
+    ("[[medium]]", "[[medium]]\n[[medium]]", "`medium[0].profile` is missing", ""),
+    ("[[medium]]", "[[medium]", "must be TOML", "line"),
+    ("[sun]", f"x = {'[' * 3000}", "must be TOML", ""),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "key", "rest"), BAD)
+def test_a_bad_file_is_refused_by_key_rule_and_value(tmp_path, old, new, key, rest):
+    path = tmp_path / "scene.toml"
+    path.write_text(changed(old, new))
+    with pytest.raises(ValueError) as caught:
+        load(path)
+    assert str(caught.value).startswith(f"{path}: ")
+    assert key in str(caught.value) and rest in str(caught.value)
+
+
+def test_a_file_that_is_no_text_is_refused(tmp_path):
+    path = tmp_path / "scene.toml"
+    path.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(ValueError, match="UTF-8"):
+        load(path)
+    with pytest.raises(FileNotFoundError):
+        load(tmp_path / "none.toml")
