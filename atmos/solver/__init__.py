@@ -3,4 +3,4 @@ from ._base import (
     solve as solve,
     SolvedSky as SolvedSky,
 )
-from .single_scattering import SingleScattering as SingleScattering
+from .single_scattering import QUICK as QUICK, SingleScattering as SingleScattering

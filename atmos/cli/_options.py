@@ -1,0 +1,279 @@
+"""What the commands can be told, and the objects that these words become."""
+
+import dataclasses
+import datetime
+import math
+import os
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+
+from ..camera import AbstractCamera, Fisheye, LatLong, Perspective
+from ..light import ephemeris
+from ..quantity import deg
+from ._app import (
+    exposure_value,
+    HIGHEST,
+    moment,
+    numbers_option,
+    option,
+    real,
+    refuse,
+    SIGNED,
+    switch,
+    whole,
+)
+
+
+# The largest picture is 32768 pixels high.
+MOST_PIXELS = 2**15
+Wavelengths = Annotated[
+    tuple[float, ...],
+    numbers_option("Wavelengths, in nm: numbers, or FIRST:LAST:STEP.", 100, 1e5),
+]
+Zeniths = Annotated[
+    tuple[float, ...],
+    numbers_option("Angles between the view and straight up, in degrees.", 0, 180),
+]
+Altitudes = Annotated[
+    tuple[float, ...], numbers_option("Altitudes of the observer, in m.", 0, HIGHEST)
+]
+Output = Annotated[
+    Path | None, option("The CSV file to write; standard output without it.")
+]
+Precise = Annotated[bool, option("Calculate in double precision.")]
+File = Annotated[Path, option("A scene file; see `atmos scene`.")]
+
+
+@dataclasses.dataclass(frozen=True)
+class World:
+    """A ready-made world, as the options describe it."""
+
+    world: Annotated[
+        Literal["earth", "mars"] | None,
+        option("A ready-made world.  [default: earth]"),
+    ] = None
+    aerosol: Annotated[
+        str | None,
+        option(
+            "What floats in the air: an aerosol of OPAC (continental_clean, "
+            "continental_average, continental_polluted, urban, desert, maritime_clean, "
+            "maritime_polluted, maritime_tropical, arctic, antarctic), or none.  "
+            "[default: continental_clean]"
+        ),
+    ] = None
+    optical_depth: Annotated[
+        float | None,
+        real("Optical depth of the aerosol (on Mars: the dust) at 550 nm.", 0, 100, ""),
+    ] = None
+    visibility: Annotated[
+        float | None,
+        real("Visibility at the ground, instead of that.", 1, HIGHEST, "METRES"),
+    ] = None
+    ozone: Annotated[
+        float | None, real("Column of ozone.  [default: 300]", 0, 10_000, "DOBSON")
+    ] = None
+    ground: Annotated[
+        str | None,
+        option(
+            "What the ground is: grass, soil, sand, snow, sea, asphalt, concrete, "
+            "mars, or a number, its albedo.  [default: grass, or mars on Mars]"
+        ),
+    ] = None
+
+
+@dataclasses.dataclass(frozen=True)
+class SunPosition:
+    """Where the sun stands: given by angles, or by date, time and place on Earth."""
+
+    sun_elevation: Annotated[
+        float | None,
+        real("Angle above the horizon.  [default: 15]", -90, 90, "DEGREES"),
+    ] = None
+    sun_azimuth: Annotated[
+        float | None,
+        real("Clockwise from north.  [default: 40]", -360, 360, "DEGREES"),
+    ] = None
+    date: Annotated[
+        datetime.datetime | None,
+        option(
+            "Date and time (ISO 8601, UTC if it has no offset) instead of the angles. "
+            "Without a scene file, it sets how far away the sun is, too.",
+            converter=moment,
+            n_tokens=1,
+        ),
+    ] = None
+    latitude: Annotated[
+        float | None, real("North, with --date.", -90, 90, "DEGREES")
+    ] = None
+    longitude: Annotated[
+        float | None, real("East, with --date.", -180, 360, "DEGREES")
+    ] = None
+
+    def find(self) -> tuple[float, float, float] | None:
+        """Zenith angle and azimuth, in degrees, and distance in au, if asked for."""
+        place = {"--latitude": self.latitude, "--longitude": self.longitude}
+        angles = {
+            "--sun-elevation": self.sun_elevation,
+            "--sun-azimuth": self.sun_azimuth,
+        }
+        given = [name for name, x in (place | angles).items() if x is not None]
+        if self.date is None:
+            if alone := [x for x in given if x in place]:
+                refuse(alone[0], "needs a --date")
+            if not given:
+                return None
+            elevation = 15.0 if self.sun_elevation is None else self.sun_elevation
+            azimuth = 40.0 if self.sun_azimuth is None else self.sun_azimuth
+            return 90.0 - elevation, azimuth, 1.0
+        if extra := [x for x in given if x in angles]:
+            refuse(extra[0], "must not stand beside --date")
+        if self.latitude is None or self.longitude is None:
+            refuse("--date", "needs --latitude and --longitude")
+
+        zenith, azimuth, distance = ephemeris(self.date, self.latitude, self.longitude)
+        return math.degrees(zenith), math.degrees(azimuth), distance
+
+
+@dataclasses.dataclass(frozen=True)
+class View:
+    """What the picture shows."""
+
+    projection: Annotated[
+        Literal["latlong", "fisheye", "perspective"], option("Kind of picture.")
+    ] = "latlong"
+    height: Annotated[int, whole("Rows of pixels.", 1, MOST_PIXELS)] = 512
+    width: Annotated[
+        int | None,
+        whole(
+            "Columns of pixels, in perspective.  [default: 3/2 of the height]",
+            1,
+            MOST_PIXELS,
+        ),
+    ] = None
+    altitude: Annotated[
+        float, real("Of the observer, above the ground.", 0, HIGHEST, "METRES")
+    ] = 2.0
+    azimuth: Annotated[
+        float,
+        real(
+            "Clockwise from north: where the centre of the picture looks; in a fisheye "
+            "its top.",
+            -360,
+            360,
+            "DEGREES",
+            name=("--azimuth", "--center-azimuth", "--centre-azimuth"),
+        ),
+    ] = 0.0
+    elevation: Annotated[
+        float | None,
+        real("Above level, in perspective.  [default: 15]", -90, 90, "DEGREES"),
+    ] = None
+    field_of_view: Annotated[
+        float | None,
+        real(
+            "From side to side: in perspective below 180  [default: 60], in a fisheye "
+            "up to 360  [default: 180].",
+            1e-3,
+            360,
+            "DEGREES",
+        ),
+    ] = None
+
+    def camera(self) -> AbstractCamera:
+        """The camera that takes it."""
+
+        only = {"--width": self.width, "--elevation": self.elevation}
+        for name, value in only.items():
+            if value is not None and self.projection != "perspective":
+                refuse(name, "is for --projection perspective alone")
+        if self.field_of_view is not None and self.projection == "latlong":
+            refuse("--field-of-view", "is not for --projection latlong")
+        position = np.array([0.0, 0.0, self.altitude])
+        if self.projection == "latlong":
+            return LatLong(position, self.height, self.azimuth * deg)
+        if self.projection == "fisheye":
+            angle = (self.field_of_view or 180.0) * deg
+            return Fisheye(position, self.height, angle, self.azimuth * deg)
+        angle = self.field_of_view or 60.0
+        if angle >= 180.0:
+            refuse("--field-of-view", "must be below 180 in perspective", angle)
+        return Perspective(
+            position=position,
+            azimuth=self.azimuth * deg,
+            elevation=(15.0 if self.elevation is None else self.elevation) * deg,
+            field_of_view=angle * deg,
+            height=self.height,
+            width=self.width or max(1, round(1.5 * self.height)),
+        )
+
+
+@dataclasses.dataclass(frozen=True)
+class Files:
+    """What is written, and how."""
+
+    output: Annotated[Path, option("The OpenEXR file.")] = Path("sky.exr")
+    colour_space: Annotated[
+        Literal["rec709", "acescg", "aces2065-1", "xyz", "spectral"],
+        option(
+            "What the channels hold: linear colour, or spectral radiance.",
+            name=("--colour-space", "--color-space"),
+        ),
+    ] = "rec709"
+    wavelength: Wavelengths = tuple(380.0 + 10.0 * i for i in range(41))
+    half: Annotated[bool, option("Write 16-bit floats, not 32.")] = False
+    sun: Annotated[
+        bool,
+        switch("Draw the sun's disk, or leave it to a lamp."),
+    ] = True
+    preview: Annotated[
+        Path | None, option("The PNG file.  [default: beside the output]")
+    ] = None
+    no_preview: Annotated[bool, option("Write no PNG file.")] = False
+    exposure: Annotated[
+        float | None,
+        option(
+            "Exposure of the PNG, in EV at ISO 100 (15: full sun), or auto.",
+            converter=exposure_value,
+            n_tokens=1,
+            show_default=lambda _: "auto",
+            metavar="EV",
+            **SIGNED,
+        ),
+    ] = None
+
+    def check(self) -> Path | None:
+        """The PNG file, if one is wanted. Refuses what could not be written."""
+        check_output("--output", self.output, ".exr")
+        if self.no_preview:
+            if self.preview is not None or self.exposure is not None:
+                name = "--exposure" if self.preview is None else "--preview"
+                refuse(name, "must not stand beside --no-preview")
+            return None
+        preview = self.preview or self.output.with_suffix(".png")
+        check_output("--preview", preview, ".png")
+        return preview
+
+
+def check_output(option: str, path: Path, suffix: str = "") -> None:
+    folder = path.absolute().parent
+    if suffix and path.suffix.lower() != suffix:
+        refuse(option, f"must be the name of a {suffix} file", path)
+    if not folder.is_dir():
+        refuse(option, "must lie in a folder that exists", path)
+    if path.exists() and not (path.is_file() and os.access(path, os.W_OK)):
+        refuse(option, "must be a file that one may replace", path)
+    if not os.access(folder, os.W_OK):
+        refuse(option, "must lie in a folder that one may write to", path)
+
+
+def observed(sun: SunPosition, view: View) -> dict[str, str | float]:
+    """What the header says of when and where."""
+    found: dict[str, str | float] = {"altitude": view.altitude}
+    if sun.date is not None and sun.latitude is not None and sun.longitude is not None:
+        found["capDate"] = sun.date.strftime("%Y:%m:%d %H:%M:%S")
+        ahead = sun.date.utcoffset() or datetime.timedelta()
+        found["utcOffset"] = -ahead.total_seconds()
+        found |= {"latitude": sun.latitude, "longitude": sun.longitude}
+    return found

@@ -1,0 +1,121 @@
+"""`atmos sky`: pictures."""
+
+import concurrent.futures
+from pathlib import Path
+from typing import Annotated
+
+import jax.numpy as jnp
+import numpy as np
+
+from .. import colour, image
+from ..camera import AbstractCamera, LatLong
+from ..disk import render_disks
+from ..render import render
+from ..scene import Scene
+from ..solver import QUICK
+from ._app import app, CAMERA, flat, option, OUTPUT, refuse, SUN, WORLD
+from ._lamp import header, measure_lamp
+from ._options import Files, observed, SunPosition, View, World
+from ._session import progress_bar, start
+from ._world import make_scene, solve_file
+
+
+_LARGEST_HALF = 65504.0
+
+
+@app.command
+def sky(
+    scene: Annotated[Path | None, option("A scene file instead of a world.")] = None,
+    /,
+    *,
+    world: Annotated[World | None, flat(WORLD)] = None,
+    sun: Annotated[SunPosition | None, flat(SUN)] = None,
+    view: Annotated[View | None, flat(CAMERA)] = None,
+    files: Annotated[Files | None, flat(OUTPUT)] = None,
+) -> None:
+    """Render the sky as an OpenEXR picture, and a PNG to look at.
+
+    Values are radiances; the header of the file has their unit, and the scene.
+
+    For example:
+
+    atmos sky
+
+    atmos sky --sun-elevation 3 --aerosol maritime_clean --output sea.exr
+
+    atmos sky --date 2026-06-21T18:30+02:00 --latitude 48.1 --longitude 11.6
+
+    atmos sky --world mars --projection perspective --azimuth 40 --output mars.exr
+
+    atmos sky my.toml --no-sun --half --colour-space acescg
+    """
+    world, sun, view = world or World(), sun or SunPosition(), view or View()
+    files = files or Files()
+    preview = files.check()
+    start()
+
+    wavelength = np.array(files.wavelength, np.float32)
+    step = (wavelength[-1] - wavelength[0]) / max(1, wavelength.size - 1) or 10.0
+    found = make_scene(scene, world, sun, float(step))
+    camera = view.camera()
+    write_picture(found, scene, camera, wavelength, files, preview, observed(sun, view))
+
+
+def write_picture(
+    scene: Scene,
+    path: Path | None,
+    camera: AbstractCamera,
+    wavelength: np.ndarray,
+    files: Files,
+    preview: Path | None,
+    observed: dict[str, str | float],
+) -> None:
+    """Renders a scene and writes what was asked for."""
+    spectral = files.colour_space == "spectral"
+    space = colour.COLOUR_SPACES["rec709" if spectral else files.colour_space]
+    seen = not spectral or (
+        wavelength.size > 1 and colour.has_colour(wavelength.astype(float))
+    )
+    bands = jnp.asarray(wavelength)
+    weights = colour.response(bands) if seen else None
+    response = None if spectral else space.from_xyz(weights)
+    sky = solve_file(scene, QUICK, bands, path)
+
+    def lights():
+        disks = render_disks(sky, camera, response) if files.sun else np.zeros(1)
+        if files.half and np.max(disks) > _LARGEST_HALF:
+            rule = "cannot hold the sun's disk; leave it to a lamp with --no-sun"
+            refuse("--half", rule, f"{np.max(disks):g}")
+        return disks, [
+            measure_lamp(sky, x, camera, space, weights) for x in sky.scene.lights
+        ]
+
+    # Most of the time goes to compiling, of which a thread takes its share.
+    with concurrent.futures.ThreadPoolExecutor(1) as other, progress_bar("sky") as tell:
+        lit = other.submit(lights)
+        if files.half:
+            lit.result()
+        picture = np.asarray(render(sky, camera, response, progress=tell))
+        disks, lamps = lit.result()
+    picture = picture + disks.astype(picture.dtype)
+
+    said = header(scene, QUICK, wavelength, lamps) | observed
+    latlong = isinstance(camera, LatLong)
+    kind = {"half": files.half, "latlong": latlong, "attributes": said}
+    if spectral:
+        image.write_spectral_exr(files.output, picture, wavelength, **kind)
+    else:
+        image.write_exr(files.output, picture, space, **kind)
+    for lamp in lamps:
+        print(lamp)
+    size = f"{camera.width} x {camera.height}"
+    print(f"wrote {files.output}: {size}, {files.colour_space}")
+    if preview is not None and seen:
+        xyz = jnp.asarray(picture)
+        xyz = colour.to_xyz(xyz, bands) if spectral else space.to_xyz(xyz)
+        exposure = files.exposure
+        if exposure is None:
+            exposure = round(float(colour.automatic_exposure(xyz)), 2)
+        note = {"exposure": f"EV {exposure:g} at ISO 100"}
+        image.write_png(preview, colour.preview(xyz, exposure), note)
+        print(f"wrote {preview}: exposure EV {exposure:g}")

@@ -1,0 +1,161 @@
+"""`atmos radiance` and `atmos optical-depth`: numbers."""
+
+import math
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import equinox as eqx
+import numpy as np
+
+from ..image import whole_file
+from ..rays import (
+    angles,
+    combinations,
+    direction,
+    optical_depths,
+    padded,
+    radiances,
+)
+from ..scenefile import load
+from ._app import app, numbers_option, option, refuse
+from ._options import (
+    Altitudes,
+    check_output,
+    File,
+    Output,
+    Precise,
+    Wavelengths,
+    Zeniths,
+)
+from ._session import progress_bar, start
+from ._world import solve_file, solver_named
+
+
+@app.command
+def radiance(
+    scene: File,
+    /,
+    *,
+    solver: Annotated[Literal["single"], option("How: scattered once.")] = "single",
+    sun_zenith: Annotated[
+        tuple[float, ...] | None,
+        numbers_option("Zenith angles of the sun, in degrees.", 0, 180),
+    ] = None,
+    altitude: Altitudes = (0.0,),
+    view_zenith: Zeniths = (0.0,),
+    azimuth: Annotated[
+        tuple[float, ...],
+        numbers_option("View azimuths relative to the sun's, in degrees.", -360, 360),
+    ] = (0.0,),
+    wavelength: Wavelengths = (450.0, 550.0, 650.0),
+    output: Output = None,
+    float64: Precise = False,
+) -> None:
+    """Spectral radiance of the sky, without the sun's disk, as a CSV table.
+
+    All combinations of the numbers given; a view zenith beyond 90 looks down.
+
+    sun_zenith, view_zenith, azimuth are in degrees, altitude in m, wavelength in
+    nm, and radiance in W m^-2 sr^-1 nm^-1 if that is the scene's irradiance per sr.
+
+    For example:
+
+    atmos radiance my.toml --view-zenith 0:85:5,89 --azimuth 0,90,180
+    """
+    if output is not None:
+        check_output("--output", output)
+    start(float64)
+
+    found = load(scene)
+    if len(found.lights) != 1:
+        refuse("sun", "must be one alone", f"{len(found.lights)} in '{scene}'")
+    own, towards = angles(np.asarray(found.lights[0].direction))
+    suns = (own,) if sun_zenith is None else sun_zenith
+    bands = padded(np.array(wavelength, np.float64 if float64 else np.float32))
+    axes = [np.array(x) for x in (altitude, view_zenith, azimuth)]
+
+    def blocks() -> Iterator[tuple[Sequence[Any], Any]]:
+        for zenith in suns:
+            light = direction(zenith, towards).astype(bands.dtype)
+            lit = eqx.tree_at(lambda x: x.lights[0].direction, found, light)
+            sky = solve_file(lit, solver_named(solver), bands, scene)
+            for height, tilt, turn in combinations(sky, *axes):
+                values = radiances(sky, height, direction(tilt, towards + turn))
+                yield (np.full(height.shape, zenith), height, tilt, turn), values
+
+    names = "sun_zenith,altitude,view_zenith,azimuth,wavelength,radiance"
+    count = len(suns) * math.prod(x.size for x in axes)
+    write_table(output, names, wavelength, blocks(), count)
+
+
+@app.command
+def optical_depth(
+    scene: File,
+    /,
+    *,
+    altitude: Altitudes = (0.0,),
+    view_zenith: Zeniths = (0.0,),
+    wavelength: Wavelengths = (450.0, 550.0, 650.0),
+    output: Output = None,
+    float64: Precise = False,
+) -> None:
+    """Optical depth from the observer to the ground or the top of the air, as CSV.
+
+    All combinations of the numbers given, looking towards north.
+
+    altitude is in m, view_zenith in degrees, wavelength in nm.
+
+    For example:
+
+    atmos optical-depth my.toml --view-zenith 0,60,90 --wavelength 300:800:50
+    """
+    if output is not None:
+        check_output("--output", output)
+    start(float64)
+
+    bands = padded(np.array(wavelength, np.float64 if float64 else np.float32))
+    sky = solve_file(load(scene), solver_named("single"), bands, scene)
+    axes = [np.array(x) for x in (altitude, view_zenith)]
+
+    def blocks() -> Iterator[tuple[Sequence[Any], Any]]:
+        for height, tilt in combinations(sky, *axes):
+            yield (height, tilt), optical_depths(sky, height, direction(tilt, 0.0))
+
+    names = "altitude,view_zenith,wavelength,optical_depth"
+    write_table(output, names, wavelength, blocks(), math.prod(x.size for x in axes))
+
+
+def write_table(
+    output: Path | None,
+    names: str,
+    wavelength: Sequence[float],
+    blocks: Iterator[tuple[Sequence[Any], Any]],
+    count: int,
+) -> None:
+    """Writes rows as CSV, a line for each ray and wavelength."""
+
+    bands = [f"{x:.10g}" for x in wavelength]
+
+    def write(file):
+        done = 0
+        for columns, values in blocks:
+            if done == 0:
+                file.write(f"{names}\n")
+            if not np.all(np.isfinite(values)):
+                raise ValueError(f"`{names.split(',')[-1]}` is not finite somewhere.")
+            digits = 17 if values.dtype == np.float64 else 9
+            for *row, line in zip(*columns, values.tolist(), strict=True):
+                start = ",".join(f"{x:.10g}" for x in row)
+                for band, value in zip(bands, line, strict=False):
+                    file.write(f"{start},{band},{value:.{digits}g}\n")
+            done += len(values)
+            tell(done / count)
+
+    with progress_bar(names.split(",")[-1]) as tell:
+        if output is None:
+            write(sys.stdout)
+            return
+        with whole_file(output) as part, open(part, "w", newline="") as file:
+            write(file)

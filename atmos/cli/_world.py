@@ -1,0 +1,125 @@
+"""From words to worlds: scene files and ready-made worlds."""
+
+import contextlib
+import dataclasses
+from collections.abc import Iterator
+from pathlib import Path
+
+import equinox as eqx
+from jaxtyping import ArrayLike
+
+from ..light import SOLAR_RADIUS, Sun, sunlight
+from ..particle.surface import albedo
+from ..rays import direction
+from ..scene import earth, mars, Scene
+from ..scenefile import load, opac
+from ..solver import AbstractSolver, SingleScattering, solve, SolvedSky
+from ..spectrum import AbstractSpectrum, Constant
+from ._app import refuse
+from ._options import SunPosition, World
+
+
+def make_scene(
+    path: Path | None, world: World, position: SunPosition, bandwidth: float
+) -> Scene:
+    """The scene of a file, or a ready-made world, under the sun that is asked for."""
+
+    where = position.find()
+    if path is not None:
+        for name, value in vars(world).items():
+            if value is not None:
+                option = f"--{name.replace('_', '-')}"
+                refuse(option, "must not stand beside a scene file", path)
+        found = load(path)
+        if where is None:
+            return found
+        if len(found.lights) != 1:
+            refuse("sun", "must be one alone to be moved", len(found.lights))
+        towards = direction(*where[:2]).astype(found.lights[0].direction.dtype)
+        return eqx.tree_at(lambda x: x.lights[0].direction, found, towards)
+    zenith, azimuth, distance = where or (75.0, 40.0, 1.0)
+    if world.world == "mars":
+        if position.date is not None:
+            refuse("--date", "is for the Earth; give angles on Mars")
+        distance = 1.524
+    light = sunlight(bandwidth, distance)
+    sun = Sun(direction(zenith, azimuth), light, SOLAR_RADIUS / distance)
+    return _mars(world, sun) if world.world == "mars" else _earth(world, sun)
+
+
+def _mars(world: World, sun: Sun) -> Scene:
+    for name in ("aerosol", "visibility", "ozone"):
+        if getattr(world, name) is not None:
+            refuse(f"--{name}", "is not for --world mars")
+    dust = 0.5 if world.optical_depth is None else world.optical_depth
+    return mars(sun, dust, _ground(world.ground))
+
+
+def _earth(world: World, sun: Sun) -> Scene:
+    amounts = {
+        "--optical-depth": world.optical_depth,
+        "--visibility": world.visibility,
+    }
+    given = [name for name, x in amounts.items() if x is not None]
+    column = 300.0 if world.ozone is None else world.ozone
+    if world.aerosol == "none":
+        if given:
+            refuse(given[0], "must not stand beside --aerosol none")
+        clear = earth(sun, None, column, _ground(world.ground))
+        return dataclasses.replace(clear, media=clear.media[:2])
+    if len(given) > 1:
+        refuse("--visibility", "must not stand beside --optical-depth")
+    name = (world.aerosol or "continental_clean").replace("-", "_")
+    with about({"name": "--aerosol", "visibility": "--visibility"}):
+        aerosol = opac(name, world.optical_depth, world.visibility)
+    return earth(sun, aerosol, column, _ground(world.ground))
+
+
+def _ground(text: str | None) -> AbstractSpectrum | None:
+    if text is None:
+        return None
+    try:
+        value = float(text)
+    except ValueError:
+        with about({"name": "--ground"}):
+            return albedo(text)
+    if not 0.0 <= value <= 1.0:
+        refuse("--ground", "must be a name, or a number from 0 to 1", text)
+    return Constant(value)
+
+
+@contextlib.contextmanager
+def about(options: dict[str, str]) -> Iterator[None]:
+    """Errors about arguments become errors about options."""
+    try:
+        yield
+    except ValueError as error:
+        text = str(error)
+        for argument, option in options.items():
+            text = text.replace(f"`{argument}`", f"`{option}`")
+        raise ValueError(text) from error
+
+
+def solver_named(name: str) -> AbstractSolver:
+    """The solver of that name, at its finest."""
+    return {"single": SingleScattering}[name]()
+
+
+def solve_file(
+    scene: Scene, solver: AbstractSolver, bands: ArrayLike, path: Path | None
+) -> SolvedSky:
+    """The sky of a scene; errors about a scene that was read name its file and keys."""
+    try:
+        return solve(scene, solver, bands)
+    except ValueError as error:
+        if path is None:
+            raise
+        text = str(error)
+        for ours, theirs in {
+            "scene.media": "medium",
+            "scene.lights[0]": "sun",
+            "scene.lights": "sun",
+            "scene.ground": "planet.ground_albedo",
+        }.items():
+            text = text.replace(ours, theirs)
+        raise ValueError(f"{path}: {text}") from error
