@@ -18,7 +18,7 @@ from .transport import optical_depth
 _MET = 25_000  # samples that meet a disk, at least, if it is small
 _GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 _STRIPS = 33  # zenith angles at which the air in front of a disk is known
-_TOGETHER = 2**15  # samples that are worked on together
+_TOGETHER = 2**16  # samples that are worked on together
 
 
 def render_disks(
@@ -26,8 +26,8 @@ def render_disks(
 ) -> Float[np.ndarray, "height width channel"]:
     """The disks of the lights alone, through the air: to be added to what `render` saw.
 
-    Each pixel is the mean over its area, so that the picture holds a light's irradiance
-    however coarse it is. Shape and unit are those of `render`.
+    Each pixel is the mean over its area, so that the picture holds the irradiance of a
+    light, to 1e-3 or better from 256 rows on. Shape and unit are those of `render`.
     """
     dtype = sky.wavelength.dtype
     camera = jax.tree.map(lambda x: x.astype(dtype), camera)
@@ -76,7 +76,7 @@ def _samples(
     x, y = (jnp.asarray(z + 0.5, camera.position.dtype) for z in (columns, rows))
     share = float(jnp.max(jax.vmap(camera.solid_angle)(x, y))) / (math.pi * radius**2)
     fewest = 8 if rows.size < 2**15 else 4
-    return 2 ** min(max(math.ceil(math.log2(share * _MET)), fewest), 12)
+    return 2 ** min(max(math.ceil(math.log2(share * _MET)), fewest), 16)
 
 
 def _extent(camera: AbstractCamera) -> float:

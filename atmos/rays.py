@@ -61,9 +61,7 @@ def padded(wavelength: Float[np.ndarray, "wl"]) -> Float[np.ndarray, "more"]:
     return np.pad(wavelength, (0, size - wavelength.size), mode="edge")
 
 
-def combinations(
-    sky: SolvedSky, *axes: np.ndarray
-) -> Iterator[tuple[np.ndarray, ...]]:
+def combinations(sky: SolvedSky, *axes: np.ndarray) -> Iterator[tuple[np.ndarray, ...]]:
     """All combinations of numbers, the last axis fastest, as blocks of columns."""
     shape = tuple(axis.size for axis in axes)
     count, block = math.prod(shape), _block(sky)

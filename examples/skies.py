@@ -8,7 +8,7 @@ import jax.numpy as jnp
 from atmos import colour, deg, earth, image, km, mars, render, render_disks, solve
 from atmos.camera import LatLong, Perspective
 from atmos.light import SOLAR_RADIUS, Sun, sunlight
-from atmos.solver import SingleScattering
+from atmos.solver import QUICK
 
 
 WAVELENGTH = jnp.linspace(380.0, 780.0, 41)
@@ -37,7 +37,7 @@ def main(folder, size):
     response = colour.response(WAVELENGTH)
     pictures = {}
     for name, scene, camera in skies(size):
-        sky = solve(scene, SingleScattering(7, 6, 14), WAVELENGTH)
+        sky = solve(scene, QUICK, WAVELENGTH)
         air = render(sky, camera, response)
         xyz = pictures[name] = air + render_disks(sky, camera, response)
         exposure = colour.automatic_exposure(air)

@@ -106,9 +106,7 @@ def classes():
 
 def test_every_class_is_abstract_or_final():
     for cls in classes():
-        abstract = inspect.isabstract(cls) or bool(
-            getattr(cls, "__abstractvars__", ())
-        )
+        abstract = inspect.isabstract(cls) or bool(getattr(cls, "__abstractvars__", ()))
         assert cls.__name__.startswith("Abstract") == abstract, cls
         for base in cls.__mro__[1:]:
             if base.__module__.startswith("atmos"):

@@ -1,4 +1,4 @@
-"""Pictures show what the sky is, pixel by pixel, and the sun's disk with all its light."""
+"""Pictures show what the sky is, pixel by pixel, and the disk with all its light."""
 
 import equinox as eqx
 import jax
@@ -23,13 +23,12 @@ from atmos import (
 from atmos.camera import Fisheye, LatLong, Perspective
 from atmos.phase import DoubleHenyeyGreenstein, HenyeyGreenstein, Rayleigh
 from atmos.sky import Grid, Resolution
-from atmos.solver import SingleScattering
+from atmos.solver import QUICK
 from atmos.spectrum import Constant, PowerLaw, Tabulated
 from atmos.transport import direct_irradiance
 
 
 NM = jnp.array([400.0, 550.0, 700.0])
-QUICK = SingleScattering(7, 6, 14)
 
 
 def place(altitude):

@@ -31,7 +31,6 @@ EACH = np.arange(360.0, 831.0, 1.0, np.float32)
 ELEVATIONS = [60.0, 5.0, 0.0]
 SPACES = {"rec709": ours.REC709, "acescg": ours.ACESCG}
 HEIGHT = 64
-SOLVER = solver.SingleScattering(7, 6, 14)
 AT = jnp.array([0.0, 0.0, 2.0], jnp.float32)
 
 
@@ -83,8 +82,8 @@ def claims(arguments: argparse.Namespace) -> Iterator[Claim]:
     dome, half = camera.LatLong(AT, HEIGHT), HEIGHT // 2
     source = "1 nm, CIE 1931, CIEDE2000"
     for elevation in ELEVATIONS:
-        few = atmos.solve(world(elevation, 10.0), SOLVER, NM)
-        many = atmos.solve(world(elevation, 1.0), SOLVER, EACH)
+        few = atmos.solve(world(elevation, 10.0), solver.QUICK, NM)
+        many = atmos.solve(world(elevation, 1.0), solver.QUICK, EACH)
         picture = atmos.render(few, dome, response)
         bright = ours.to_xyz(disk(few), few.wavelength)
         spectra = np.asarray(atmos.render(many, dome), float)

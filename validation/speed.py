@@ -24,7 +24,6 @@ from atmos import camera, colour, deg, light, render, render_disks, solver
 
 
 NM = jnp.linspace(380.0, 780.0, 41)
-QUICK = solver.SingleScattering(7, 6, 14)
 
 
 def measure(work, runs=5):
@@ -41,7 +40,7 @@ def pictures():
     """Rows of name, first run and later runs in seconds, and the bar for the latter."""
     at = jnp.array([0.0, 0.0, 2.0])
     sun = light.Sun.at(60 * deg, 0.0, light.sunlight())
-    sky = atmos.solve(atmos.earth(sun), QUICK, NM)
+    sky = atmos.solve(atmos.earth(sun), solver.QUICK, NM)
     xyz = colour.response(NM)
     dome, large = camera.LatLong(at, 512), camera.LatLong(at, 2048)
 
@@ -67,8 +66,8 @@ def commands():
     """The first `atmos sky` of a machine, and the next."""
     with tempfile.TemporaryDirectory() as folder:
         environment = os.environ | {"ATMOS_CACHE": os.path.join(folder, "cache")}
-        command = [sys.executable, "-m", "atmos.cli", "sky", "--output"]
-        command.append(os.path.join(folder, "sky.exr"))
+        command = [os.path.join(os.path.dirname(sys.executable), "atmos"), "sky"]
+        command += ["--output", os.path.join(folder, "sky.exr")]
         times = []
         for _ in range(4):
             start = time.perf_counter()

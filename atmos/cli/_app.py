@@ -26,11 +26,13 @@ app = App(
 
 
 def refuse(option: str, rule: str, value: object = None) -> NoReturn:
+    """Raises `ValueError` that names an option, the rule and the value."""
     got = "" if value is None else f"; got {value}"
     raise ValueError(f"`{option}` {rule}{got}.")
 
 
 def number(text: str, low: float | int, high: float | int) -> float:
+    """A number from `low` to `high`, read from text; raises `ValueError` otherwise."""
     try:
         value = float(text)
     except ValueError:
@@ -64,12 +66,15 @@ def _numbers(text: str, low: float | int, high: float | int) -> tuple[float, ...
 
 
 def option(description: str, **more: Any) -> Parameter:
+    """An option and what help says of it."""
     return Parameter(help=description, negative=(), **more)
 
 
 def real(
     description: str, low: float | int, high: float | int, unit: str, **more: Any
 ) -> Parameter:
+    """An option that is a number from `low` to `high`."""
+
     def convert(type_, tokens):
         return number(tokens[0].value, low, high)
 
@@ -78,6 +83,8 @@ def real(
 
 
 def whole(description: str, low: int, high: int, **more: Any) -> Parameter:
+    """An option that is a whole number from `low` to `high`."""
+
     def convert(type_, tokens):
         text = tokens[0].value
         value = number(text, low, high)
@@ -92,6 +99,8 @@ def whole(description: str, low: int, high: int, **more: Any) -> Parameter:
 def numbers_option(
     description: str, low: float | int, high: float | int, **more: Any
 ) -> Parameter:
+    """An option that is a list of numbers and ranges, all from `low` to `high`."""
+
     def convert(type_, tokens):
         return _numbers(tokens[0].value, low, high)
 
@@ -114,6 +123,7 @@ def numbers_option(
 
 
 def moment(type_, tokens) -> datetime.datetime:
+    """A date and time, read from ISO 8601."""
     text = tokens[0].value
     try:
         return datetime.datetime.fromisoformat(text)
@@ -123,6 +133,7 @@ def moment(type_, tokens) -> datetime.datetime:
 
 
 def exposure_value(type_, tokens) -> float | None:
+    """An exposure value, or None for an automatic one."""
     text = tokens[0].value
     return None if text == "auto" else number(text, -50.0, 50.0)
 
@@ -133,4 +144,5 @@ def switch(description: str) -> Parameter:
 
 
 def flat(group: Group) -> Parameter:
+    """A group of options that stand by themselves."""
     return Parameter(name="*", group=group)

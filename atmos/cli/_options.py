@@ -257,6 +257,7 @@ class Files:
 
 
 def check_output(option: str, path: Path, suffix: str = "") -> None:
+    """Refuses a file that could not be written, before the work is done."""
     folder = path.absolute().parent
     if suffix and path.suffix.lower() != suffix:
         refuse(option, f"must be the name of a {suffix} file", path)

@@ -20,7 +20,7 @@ _FINER = 4
 
 
 class Resolution(eqx.Module):
-    """How many rings lie above and below the horizon; how many azimuths on half a ring."""
+    """How many rings lie above and below the horizon; azimuths on half of each."""
 
     above: int = eqx.field(static=True)
     below: int = eqx.field(static=True)

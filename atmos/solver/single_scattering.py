@@ -24,8 +24,8 @@ class SingleScattering(AbstractSolver):
     A ray is cut where a medium, or the light that falls on it, is not smooth: at edges
     of media, and where the sun's rays have grazed the planet or such an edge. Each
     piece takes `nodes` places by Gauss and Legendre, and so does each piece of the way
-    from there to the sun with `light_nodes`. Of more than `pieces`, the shortest join a
-    neighbour.
+    from there to the sun with `light_nodes`. Where there are more than `pieces`, the
+    shortest are joined.
     """
 
     nodes: int = eqx.field(static=True, default=8)
@@ -100,7 +100,7 @@ class SingleScattering(AbstractSolver):
         far: Length,
         extinction: Float[Array, "medium wl"],
     ) -> Float[Array, "depth"]:
-        """How far one sees until so much is lost, or a little past it; at most `far`."""
+        """How far one sees until so much is lost, or a bit past it; at most `far`."""
         fixed, whole, extinction = jax.lax.stop_gradient((path, far, extinction))
         limits = jnp.array(_DEPTHS, whole.dtype)
 
@@ -148,10 +148,17 @@ QUICK = SingleScattering(nodes=7, light_nodes=6, pieces=14)
 
 
 def _join(edges: Float[Array, "edge"], pieces: int) -> Float[Array, "cut"]:
-    """The edges of the longest `pieces`; what is shorter goes with its neighbour."""
-    lengths = jnp.diff(edges)
-    longest = jnp.sort(jnp.argsort(-lengths)[:pieces])
-    return jnp.concatenate([edges[:1], edges[longest[1:]], edges[-1:]])
+    """Drops edges, always where least is joined, until `pieces` pieces are left."""
+    last = edges.shape[0] - 1
+    fixed, places = jax.lax.stop_gradient(edges), jnp.arange(last + 1)
+
+    def drop(count, kept):
+        at = fixed[kept]
+        joined = jnp.where(places[1:-1] < last - count, at[2:] - at[:-2], jnp.inf)
+        return jnp.where(places <= jnp.argmin(joined), kept, jnp.roll(kept, -1))
+
+    kept = jax.lax.fori_loop(0, max(last - pieces, 0), drop, places)
+    return edges[kept[: pieces + 1]]
 
 
 def _sum(product: str, *terms: Array) -> Array:
