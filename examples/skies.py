@@ -18,7 +18,7 @@ MARS = 1.524  # distance from the sun in au
 def skies(size):
     """Names, scenes and cameras of pictures that are `size` pixels high."""
     ground, orbit = jnp.array([0.0, 0.0, 2.0]), jnp.array([0.0, 0.0, 400 * km])
-    wide = lambda at, up, view: Perspective(at, 0.0, up, view, size, 3 * size // 2)
+    wide = lambda at, up, view: Perspective(at, 0.0, up, view, size, 2 * size)
 
     def under(world, zenith, distance=1.0):
         spectrum = sunlight(10.0, distance)
@@ -26,24 +26,26 @@ def skies(size):
 
     return [
         ("noon", under(earth, 35 * deg), LatLong(ground, size)),
-        ("sunset", under(earth, 88.5 * deg), wide(ground, 14 * deg, 60 * deg)),
-        ("mars", under(mars, 86 * deg, MARS), wide(ground, 12 * deg, 50 * deg)),
-        ("orbit", under(earth, 62 * deg), wide(orbit, -18 * deg, 50 * deg)),
+        ("sunset", under(earth, 88.5 * deg), wide(ground, 12 * deg, 70 * deg)),
+        ("mars", under(mars, 86 * deg, MARS), wide(ground, 10 * deg, 60 * deg)),
+        ("orbit", under(earth, 62 * deg), wide(orbit, -19 * deg, 60 * deg)),
     ]
 
 
 def main(folder, size):
-    """Writes the pictures into a folder and returns their XYZ."""
+    """Writes the pictures, and all in one, into a folder, and returns their XYZ."""
     response = colour.response(WAVELENGTH)
-    pictures = {}
+    pictures, shown = {}, []
     for name, scene, camera in skies(size):
         sky = solve(scene, QUICK, WAVELENGTH)
         air = render(sky, camera, response)
         xyz = pictures[name] = air + render_disks(sky, camera, response)
-        exposure = colour.automatic_exposure(air)
-        image.write_png(folder / f"{name}.png", colour.preview(xyz, exposure))
+        shown.append(colour.preview(xyz, colour.automatic_exposure(air)))
+        image.write_png(folder / f"{name}.png", shown[-1])
+    rows = [jnp.concatenate(shown[i : i + 2], 1) for i in (0, 2)]
+    image.write_png(folder / "skies.png", jnp.concatenate(rows))
     return pictures
 
 
 if __name__ == "__main__":
-    main(pathlib.Path(sys.argv[1] if sys.argv[1:] else "."), 400)
+    main(pathlib.Path(sys.argv[1] if sys.argv[1:] else "."), 320)

@@ -18,7 +18,7 @@ def load(name):
 
 def test_skies(tmp_path):
     pictures = load("skies").main(tmp_path, 8)
-    assert {x.stem for x in tmp_path.iterdir()} == set(pictures)
+    assert {x.stem for x in tmp_path.iterdir()} == {*pictures, "skies"}
     luminance = {name: np.asarray(xyz)[..., 1] for name, xyz in pictures.items()}
     assert all(np.all(np.isfinite(x) & (x >= 0.0)) for x in luminance.values())
     assert np.all(luminance["orbit"][0] == 0.0), "space above the limb is black"
