@@ -8,7 +8,7 @@ import jax.numpy as jnp
 from atmos import colour, deg, earth, image, km, mars, render, render_disks, solve
 from atmos.camera import LatLong, Perspective
 from atmos.light import SOLAR_RADIUS, Sun, sunlight
-from atmos.solver import QUICK
+from atmos.solver import QUICK, SingleScattering
 
 
 WAVELENGTH = jnp.linspace(380.0, 780.0, 41)
@@ -37,7 +37,8 @@ def main(folder, size):
     response = colour.response(WAVELENGTH)
     pictures, shown = {}, []
     for name, scene, camera in skies(size):
-        sky = solve(scene, QUICK, WAVELENGTH)
+        solver = SingleScattering() if name == "orbit" else QUICK
+        sky = solve(scene, solver, WAVELENGTH)
         air = render(sky, camera, response)
         xyz = pictures[name] = air + render_disks(sky, camera, response)
         shown.append(colour.preview(xyz, colour.automatic_exposure(air)))

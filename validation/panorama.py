@@ -140,10 +140,9 @@ def claims(arguments: argparse.Namespace) -> Iterator[Claim]:
     # One world compiles while the other is worked on.
     with concurrent.futures.ThreadPoolExecutor() as pool:
         measured = list(pool.map(measure, WORLDS))
-    print(
-        f"{'':22}{'anywhere':^27}{'above horizon':^18}{'below':^18}"
-        f"{'other':>9}{'no':>9}"
-    )
+    places = [("anywhere", 27), ("above horizon", 18), ("below", 18)]
+    over = "".join(f"{name:^{width}}" for name, width in places)
+    print(f"{'':22}{over}{'other':>9}{'no':>9}")
     heads = ["median", *3 * ["99 %", "max"], "picture", "table"]
     print(f"{'world':10}{'eye km':>7}{'sun':>5}" + "".join(f"{x:>9}" for x in heads))
     for lines, _ in measured:

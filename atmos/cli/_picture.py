@@ -10,9 +10,10 @@ import numpy as np
 from .. import colour, image
 from ..camera import AbstractCamera, LatLong
 from ..disk import render_disks
+from ..quantity import km
 from ..render import render
 from ..scene import Scene
-from ..solver import QUICK
+from ..solver import QUICK, SingleScattering
 from ._app import app, CAMERA, flat, option, OUTPUT, refuse, SUN, WORLD
 from ._lamp import header, measure_lamp
 from ._options import Files, observed, SunPosition, View, World
@@ -79,7 +80,9 @@ def write_picture(
     bands = jnp.asarray(wavelength)
     weights = colour.response(bands) if seen else None
     response = None if spectral else space.from_xyz(weights)
-    sky = solve_file(scene, QUICK, bands, path)
+    # From above, rays pass more edges of media than the quick solver tells apart.
+    solver = QUICK if camera.position[2] < 20 * km else SingleScattering()
+    sky = solve_file(scene, solver, bands, path)
 
     def lights():
         disks = render_disks(sky, camera, response) if files.sun else np.zeros(1)
@@ -99,7 +102,7 @@ def write_picture(
         disks, lamps = lit.result()
     picture = picture + disks.astype(picture.dtype)
 
-    said = header(scene, QUICK, wavelength, lamps) | observed
+    said = header(scene, solver, wavelength, lamps) | observed
     latlong = isinstance(camera, LatLong)
     kind = {"half": files.half, "latlong": latlong, "attributes": said}
     if spectral:

@@ -28,14 +28,14 @@ class Resolution(eqx.Module):
 
 
 COARSE = Resolution(48, 32, 25)
-FINE = Resolution(128, 96, 65)
+FINE = Resolution(128, 64, 65)
 
 
 class Grid(eqx.Module):
     """Directions: rings of equal zenith angle, and azimuths on them.
 
-    Rings crowd at the horizon from both sides, and at the edge of the air if that is
-    seen from outside. Azimuths run from that of the light to the opposite one: the
+    Rings crowd at the horizon, most of all below it, where the ground is soon near; and
+    at the edge of the air if that is seen from outside. Azimuths run from that of the light to the opposite one: the
     other half of the sky is alike.
     """
 
@@ -48,7 +48,7 @@ class Grid(eqx.Module):
         dtype = self.horizon.dtype
         up = jnp.linspace(1.0, 0.0, self.resolution.above, dtype=dtype) ** 3
         up = jnp.where(self.first > 0.0, up * (2.0 - up), up)
-        down = jnp.linspace(0.0, 1.0, self.resolution.below, dtype=dtype) ** 3
+        down = jnp.linspace(0.0, 1.0, self.resolution.below, dtype=dtype) ** 5
         top, bottom = self.horizon - _SLIVER, self.horizon + _SLIVER
         return jnp.concatenate(
             [top - (top - self.first) * up, bottom + (math.pi - bottom) * down]
@@ -67,7 +67,7 @@ class Grid(eqx.Module):
         rest = jnp.maximum(1.0 - up, 0.0)
         up = jnp.where(self.first > 0.0, up / (1.0 + _root(rest, jnp.sqrt)), up)
         up = _root(up, jnp.cbrt)
-        down = _root((zenith - bottom) / (math.pi - bottom), jnp.cbrt)
+        down = _root((zenith - bottom) / (math.pi - bottom), lambda x: x**0.2)
         return jnp.where(
             zenith > self.horizon,
             self.resolution.above + down * (self.resolution.below - 1),
@@ -81,7 +81,7 @@ class Grid(eqx.Module):
 
 
 def _root(x: Array, function: Callable[[Array], Array]) -> Array:
-    inside = x > 1e-12
+    inside = x > 1e-20
     return jnp.where(inside, function(jnp.where(inside, x, 1.0)), 0.0)
 
 

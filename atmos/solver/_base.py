@@ -86,10 +86,7 @@ class SolvedSky(AbstractSky):
         """Few directions by day; more where night falls within sight."""
         dip, _ = self._edges(position[2])
         zeniths = [float(x.zenith + dip) for x in self.scene.lights]
-        chosen = FINE if max(zeniths, default=0.0) > 80.0 * deg else COARSE
-        return (
-            Resolution(chosen.above, 12, chosen.around) if position[2] < 100 else chosen
-        )
+        return FINE if max(zeniths, default=0.0) > 80.0 * deg else COARSE
 
     def _edges(self, altitude):
         """How far the horizon lies below level; the zenith angle where air begins."""
