@@ -22,4 +22,4 @@ def test_skies(tmp_path):
     luminance = {name: np.asarray(xyz)[..., 1] for name, xyz in pictures.items()}
     assert all(np.all(np.isfinite(x) & (x >= 0.0)) for x in luminance.values())
     assert np.all(luminance["orbit"][0] == 0.0), "space above the limb is black"
-    assert luminance["noon"].mean() > 10.0 * luminance["mars"][:2].mean() > 0.0
+    assert luminance["noon"].mean() > 5.0 * luminance["mars"][:2].mean() > 0.0

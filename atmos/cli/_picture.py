@@ -1,6 +1,5 @@
 """`atmos sky`: pictures."""
 
-import concurrent.futures
 from pathlib import Path
 from typing import Annotated
 
@@ -84,22 +83,14 @@ def write_picture(
     solver = QUICK if camera.position[2] < 20 * km else SingleScattering()
     sky = solve_file(scene, solver, bands, path)
 
-    def lights():
-        disks = render_disks(sky, camera, response) if files.sun else np.zeros(1)
-        if files.half and np.max(disks) > _LARGEST_HALF:
-            rule = "cannot hold the sun's disk; leave it to a lamp with --no-sun"
-            refuse("--half", rule, f"{np.max(disks):g}")
-        return disks, [
-            measure_lamp(sky, x, camera, space, weights) for x in sky.scene.lights
-        ]
-
-    # Most of the time goes to compiling, of which a thread takes its share.
-    with concurrent.futures.ThreadPoolExecutor(1) as other, progress_bar("sky") as tell:
-        lit = other.submit(lights)
-        if files.half:
-            lit.result()
+    # First what may be refused.
+    disks = render_disks(sky, camera, response) if files.sun else np.zeros(1)
+    if files.half and np.max(disks) > _LARGEST_HALF:
+        rule = "cannot hold the sun's disk; leave it to a lamp with --no-sun"
+        refuse("--half", rule, f"{np.max(disks):g}")
+    lamps = [measure_lamp(sky, x, camera, space, weights) for x in sky.scene.lights]
+    with progress_bar("sky") as tell:
         picture = np.asarray(render(sky, camera, response, progress=tell))
-        disks, lamps = lit.result()
     picture = picture + disks.astype(picture.dtype)
 
     said = header(scene, solver, wavelength, lamps) | observed

@@ -35,7 +35,8 @@ class Grid(eqx.Module):
     """Directions: rings of equal zenith angle, and azimuths on them.
 
     Rings crowd at the horizon, most of all below it, where the ground is soon near; and
-    at the edge of the air if that is seen from outside. Azimuths run from that of the light to the opposite one: the
+    at the edge of the air if that is seen from outside. Azimuths run from that of the
+    light to the opposite one, since the
     other half of the sky is alike.
     """
 
