@@ -131,7 +131,7 @@ def _tabulate(sky: SolvedSky, position: Position, resolution: Resolution) -> Pan
     def table(light):
         ring = jax.vmap(look, (None, None, 0))
         rings = lambda zenith: ring(light, zenith, grid.azimuths())
-        return jax.lax.map(rings, grid.zeniths(), batch_size=4)
+        return jax.lax.map(rings, grid.zeniths(), batch_size=16)
 
     phases = [
         x for mixture in terms for x, _ in mixture if not isinstance(x, Isotropic)
