@@ -45,8 +45,24 @@ class SingleScattering(AbstractSolver):
         direction: Direction,
     ) -> Float[Array, "part wl"]:
         del prepared
-        path, far, grounded = enter(scene, position, direction)
         extinction = extinctions(scene, wavelength)
+        return self.march(scene, extinction, light, wavelength, position, direction)
+
+    def march(
+        self,
+        scene: Scene,
+        extinction: Float[Array, "medium wl"],
+        light: Sun,
+        wavelength: Wavelength,
+        position: Position,
+        direction: Direction,
+    ) -> Float[Array, "part wl"]:
+        """The same where `extinction` is what takes light from the beam.
+
+        A solver that counts light scattered almost straight on as not scattered at all
+        hands in less than the media's own.
+        """
+        path, far, grounded = enter(scene, position, direction)
         to_light = lambda point: self._to_light(scene, light, point)
         irradiance = light.irradiance.evaluate(wavelength)
 
