@@ -36,6 +36,8 @@ def render(
     camera = jax.tree.map(lambda x: x.astype(dtype), camera)
     response = None if response is None else response.astype(dtype)
     panorama = sky.panorama(camera.position)
+    if response is not None and panorama.even:
+        panorama, response = _weigh(panorama, response), None
     zenith, azimuth = camera.angles()
     if zenith.shape[1] > 1:
         panorama = _finer(panorama)
@@ -52,6 +54,11 @@ def render(
     image = parts[0] if len(parts) == 1 else jnp.concatenate(parts)
     sees = camera.sees()
     return image if sees.size == 1 else jnp.where(sees[..., None], image, 0.0)
+
+
+@eqx.filter_jit
+def _weigh(panorama: Panorama, response: Response) -> Panorama:
+    return panorama.weigh(response)
 
 
 @eqx.filter_jit

@@ -1,7 +1,6 @@
 from ._base import AbstractSky as AbstractSky
 from .panorama import (
-    COARSE as COARSE,
-    FINE as FINE,
+    fine_enough as fine_enough,
     Grid as Grid,
     Panorama as Panorama,
     Resolution as Resolution,

@@ -11,7 +11,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
 from ..phase import AbstractPhaseFunction
-from ..quantity import Angle, Wavelength
+from ..quantity import Angle, deg, km, Wavelength
 
 
 # Rings keep this far off the horizon, so that rounding leaves no doubt on which side.
@@ -27,8 +27,26 @@ class Resolution(eqx.Module):
     around: int = eqx.field(static=True)
 
 
-COARSE = Resolution(48, 32, 25)
-FINE = Resolution(128, 64, 65)
+# What is enough up to which zenith angle of the light.
+_ENOUGH = [
+    (80.0 * deg, Resolution(48, 32, 9)),
+    (88.0 * deg, Resolution(96, 48, 17)),
+    (90.5 * deg, Resolution(96, 48, 33)),
+    (math.inf, Resolution(192, 48, 65)),
+]
+_HIGH = 20.0 * km  # from here on up the thick air is a thin line
+
+
+def fine_enough(altitude: float, lowest: float) -> Resolution:
+    """The grid that shows a sky to about 1e-3.
+
+    For an observer's altitude in m and the zenith angle of the lowest light, in rad, as
+    it is where the horizon is.
+    """
+    size = next(size for most, size in _ENOUGH if lowest <= most)
+    if altitude <= _HIGH:
+        return size
+    return Resolution(192, 48, 2 * size.around - 1)
 
 
 class Grid(eqx.Module):
@@ -36,8 +54,7 @@ class Grid(eqx.Module):
 
     Rings crowd at the horizon, most of all below it, where the ground is soon near; and
     at the edge of the air if that is seen from outside. Azimuths run from that of the
-    light to the opposite one, since the
-    other half of the sky is alike.
+    light to the opposite one, since the other half of the sky is alike.
     """
 
     first: Angle  # the highest ring: what is above it is black
@@ -96,6 +113,15 @@ def _cubic(
     return first.astype(int), jnp.stack(weights, -1)
 
 
+def _matrix(
+    first: Int[Array, "n"], weights: Float[Array, "n 4"], count: int
+) -> Float[Array, "n {count}"]:
+    """The same weights among all places: a product is quicker than a look-up."""
+    place = jnp.arange(count)[None, :, None] - first[:, None, None]
+    taken = place == jnp.arange(4)[None, None, :]
+    return jnp.sum(jnp.where(taken, weights[:, None, :], 0.0), -1)
+
+
 class Panorama(eqx.Module):
     """The light that arrives at one place from all directions.
 
@@ -105,7 +131,7 @@ class Panorama(eqx.Module):
     """
 
     grid: Grid
-    table: Float[Array, "light ring around part wl"]
+    table: Float[Array, "light ring around part channel"]
     light_zenith: Float[Array, "light"]
     light_azimuth: Float[Array, "light"]
     phases: tuple[AbstractPhaseFunction, ...]
@@ -115,7 +141,7 @@ class Panorama(eqx.Module):
         self,
         zenith: Float[Array, "#height #width"],
         azimuth: Float[Array, "#height #width"],
-    ) -> Float[Array, "height width wl"]:
+    ) -> Float[Array, "height width channel"]:
         """The radiance from each direction of a picture, in W m^-2 sr^-1 nm^-1.
 
         Angles in rad, azimuth clockwise from north. Where the pixels of a row share
@@ -124,7 +150,7 @@ class Panorama(eqx.Module):
         `finer`.
         """
         shape = jnp.broadcast_shapes(zenith.shape, azimuth.shape)
-        total = jnp.zeros((*shape, *self.wavelength.shape), self.wavelength.dtype)
+        total = jnp.zeros((*shape, self.table.shape[-1]), self.table.dtype)
         in_rows = zenith.shape[1] == 1 and azimuth.shape[0] == 1
         look = self._rows if in_rows else self._pixels
         for i in range(self.table.shape[0]):
@@ -132,8 +158,9 @@ class Panorama(eqx.Module):
             turned = versine_between(zenith, self.light_zenith[i], relative)
             total += look(self.table[i], zenith, relative, self._weights(turned))
         # Between a lit place and a dark one a cubic may swing below nothing.
+        least = jnp.where(jnp.min(self.table, initial=0.0) < 0.0, -math.inf, 0.0)
         visible = (zenith >= self.grid.first)[..., None]
-        return jnp.where(visible, jnp.maximum(total, 0.0), 0.0)
+        return jnp.where(visible, jnp.maximum(total, least), 0.0)
 
     def _weights(self, turned):
         """What each part of the table is to be multiplied by, pixel by pixel."""
@@ -149,18 +176,16 @@ class Panorama(eqx.Module):
         grounded = zenith > grid.horizon
         low = jnp.where(grounded, float(size.above), 0.0)
         count = jnp.where(grounded, float(size.below), float(size.above))
-        first, weights = _cubic(grid.ring(zenith), low, low + count - 1.0)
-        taps = table[first[:, None] + jnp.arange(4)[None, :]]
-        rings = jnp.sum(weights[:, :, None, None, None] * taps, 1)
+        place, weights = _cubic(grid.ring(zenith), low, low + count - 1.0)
+        mixing = _matrix(place, weights, size.above + size.below)
+        rings = _product("hr,rapl->hapl", mixing, table)
         return jnp.pad(rings, ((0, 0), (1, 1), (0, 0), (0, 0)), mode="reflect")
 
     def _mixing(self, relative):
         """What each azimuth of such rings counts at other azimuths."""
         count = self.grid.resolution.around + 2
-        first, weights = _cubic(self.grid.side(relative) + 1.0, 0.0, count - 1.0)
-        place = jnp.arange(count)[None, :, None] - first[:, None, None]
-        taken = place == jnp.arange(4)[None, None, :]
-        return jnp.sum(jnp.where(taken, weights[:, None, :], 0.0), -1)
+        place = self.grid.side(relative) + 1.0
+        return _matrix(*_cubic(place, 0.0, count - 1.0), count)
 
     def _rows(self, table, zenith, relative, weights):
         rings, mixing = self._rings(table, zenith[:, 0]), self._mixing(relative[0])
@@ -194,6 +219,21 @@ class Panorama(eqx.Module):
         parts = (1.0 - s) * upper + s * lower
         weighted = [x * parts[..., i, :] for i, x in enumerate(weights)]
         return ft.reduce(operator.add, weighted)
+
+    @property
+    def even(self) -> bool:
+        """Whether no phase function depends on the wavelength."""
+        here = jax.ShapeDtypeStruct((), self.wavelength.dtype)
+        look = lambda versine: [x.evaluate(versine, self.wavelength) for x in self.phases]
+        return all(x.shape == (1,) for x in jax.eval_shape(look, here))
+
+    def weigh(self, response: Float[Array, "wl channel"]) -> "Panorama":
+        """The same for sums over wavelengths, with a channel in place of each.
+
+        Right only where `even`.
+        """
+        table = _product("nrapl,lc->nrapc", self.table, response)
+        return eqx.tree_at(lambda x: x.table, self, table)
 
     def finer(self) -> "Panorama":
         """The same on a grid four times as fine: for pictures that are not in rows."""

@@ -13,15 +13,15 @@ from ..light import Sun
 from ..phase import Isotropic
 from ..quantity import (
     as_float,
-    deg,
     Direction,
+    Number,
     Position,
     Radiance,
     versine,
     Wavelength,
 )
 from ..scene import Scene
-from ..sky import AbstractSky, COARSE, FINE, Grid, Panorama, Resolution
+from ..sky import AbstractSky, fine_enough, Grid, Panorama, Resolution
 
 
 class AbstractSolver(eqx.Module):
@@ -73,20 +73,13 @@ class SolvedSky(AbstractSky):
         Its zenith angles and azimuths are those at the origin, so the place must lie
         straight above it: raises `ValueError` otherwise.
         """
-        if isinstance(position, Tracer):
-            return _tabulate(self, position, FINE)
-        aside = np.asarray(position)[:2]
-        if np.any(aside != 0.0):
+        if not isinstance(position, Tracer) and np.any(np.asarray(position)[:2] != 0.0):
             raise ValueError(
                 f"`position` must lie straight above the origin; got {position}."
             )
-        return _tabulate(self, position, self._resolution(position))
-
-    def _resolution(self, position: Position) -> Resolution:
-        """Few directions by day; more where night falls within sight."""
         dip, _ = self._edges(position[2])
-        zeniths = [float(x.zenith + dip) for x in self.scene.lights]
-        return FINE if max(zeniths, default=0.0) > 80.0 * deg else COARSE
+        lowest = max((_known(x.zenith + dip) for x in self.scene.lights), default=0.0)
+        return _tabulate(self, position, fine_enough(_known(position[2]), lowest))
 
     def _edges(self, altitude):
         """How far the horizon lies below level; the zenith angle where air begins."""
@@ -102,6 +95,11 @@ class SolvedSky(AbstractSky):
         return self.solver.scattered(
             self.prepared, self.scene, light, self.wavelength, position, direction
         )
+
+
+def _known(x: Number) -> float:
+    """A number; as large as can be where it is yet to be traced."""
+    return math.inf if isinstance(x, Tracer) else float(x)
 
 
 @eqx.filter_jit
@@ -130,7 +128,8 @@ def _tabulate(sky: SolvedSky, position: Position, resolution: Resolution) -> Pan
 
     def table(light):
         ring = jax.vmap(look, (None, None, 0))
-        rings = lambda zenith: ring(light, zenith, grid.azimuths())
+        # A gradient would else keep every place on every ray.
+        rings = jax.checkpoint(lambda zenith: ring(light, zenith, grid.azimuths()))
         return jax.lax.map(rings, grid.zeniths(), batch_size=16)
 
     phases = [
@@ -176,7 +175,7 @@ def _check_wavelength(scene: Scene, wavelength: np.ndarray) -> None:
             )
     if not wavelength.size:
         return
-    known = lambda x: hasattr(x, "domain")
+    known = lambda x: hasattr(type(x), "domain")
     for path, leaf in jax.tree_util.tree_leaves_with_path(scene, is_leaf=known):
         if not known(leaf) or any(isinstance(x, Tracer) for x in jax.tree.leaves(leaf)):
             continue
