@@ -35,7 +35,8 @@ every_light = pytest.mark.parametrize("airs", AIRS)
 @pytest.fixture(scope="module")
 def judge():
     """The package that answers are compared with: its own tables and formulas."""
-    with warnings.catch_warnings():
+    # It changes how NumPy prints numbers, of which other tests know.
+    with warnings.catch_warnings(), np.printoptions():
         warnings.simplefilter("ignore")
         import colour
     return colour

@@ -28,7 +28,7 @@ class SingleScattering(AbstractSolver):
     shortest are joined.
     """
 
-    nodes: int = eqx.field(static=True, default=8)
+    nodes: int = eqx.field(static=True, default=10)
     light_nodes: int = eqx.field(static=True, default=8)
     pieces: int = eqx.field(static=True, default=28)
 
