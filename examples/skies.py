@@ -11,7 +11,7 @@ from atmos.light import SOLAR_RADIUS, Sun, sunlight
 from atmos.solver import QUICK, SingleScattering
 
 
-WAVELENGTH = jnp.linspace(380.0, 780.0, 41)
+WAVELENGTH = jnp.linspace(380.0, 780.0, 41, dtype=jnp.float32)
 MARS = 1.524  # distance from the sun in au
 
 

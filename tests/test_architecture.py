@@ -27,6 +27,7 @@ ROOMS = [
     "light",
     "scene",
     "transport",
+    "optics",
     "sky",
     "solver",
     "rays",

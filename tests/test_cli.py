@@ -74,10 +74,12 @@ def henyey_greenstein(g, cosine):
     return (1 - g * g) / (4 * math.pi * (1 + g * g - 2 * g * cosine) ** 1.5)
 
 
-@pytest.mark.parametrize("double", [False, True])
-def test_a_thin_slab_is_as_bright_as_its_phase_function(capsys, double):
+@pytest.mark.parametrize(
+    "solver, double", [("single", False), ("single", True), ("columns", False)]
+)
+def test_a_thin_slab_is_as_bright_as_its_phase_function(capsys, solver, double):
     command = (
-        "radiance thin.toml --solver single --sun-zenith 60,70 --altitude 0,1500 "
+        f"radiance thin.toml --solver {solver} --sun-zenith 60,70 --altitude 0,1500 "
         "--view-zenith 0,60,120 --azimuth 0,90,-180 --wavelength 450,650 --output "
     )
     out, err = run(capsys, f"{command} out.csv" + " --float64" * double)

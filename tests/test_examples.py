@@ -29,7 +29,7 @@ def test_skies(tmp_path):
     assert np.all(luminance["orbit"][0] == 0.0), "space above the limb is black"
 
     _, scene, camera = next(x for x in skies.skies(8) if x[0] == "noon")
-    (sun,), nm = scene.lights, skies.WAVELENGTH
+    (sun,), nm = scene.lights, skies.WAVELENGTH.astype(float)
     beam = direct_irradiance(scene, sun, camera.position, nm)
     radiance = scene.ground.evaluate(nm) / jnp.pi * jnp.cos(sun.zenith) * beam
     due = radiance @ colour.response(nm)[:, 1]

@@ -1,12 +1,12 @@
 """Pictures against marching every pixel: where does the table of the sky meet 1e-3?
 
 A picture looks radiances up in a table of directions, which is made with few nodes a
-ray, or with the default number from above 20 km. It is compared with the default solver itself, in random directions: one half of
-them all over the sphere, the other crowded from both sides at the horizon and, from
-space, at the limb of the air. Errors are relative to the radiance, or to a thousandth
-of the brightest direction where that is more. Domes are looked up by cubics, other
-pictures on a finer grid by straight lines. The last column shows the largest error of
-the picture's solver alone, without a table.
+ray, or with the default number from above 20 km. It is compared with the default solver
+itself, in random directions: one half of them all over the sphere, the other crowded
+from both sides at the horizon and, from space, at the limb of the air. Errors are
+relative to the radiance, or to a thousandth of the brightest direction where that is
+more. Domes are looked up by cubics, other pictures on a finer grid by straight lines.
+The last column shows the largest error of the picture's solver alone, without a table.
 
     python -m validation.panorama
 """

@@ -43,6 +43,13 @@ Output = Annotated[
     Path | None, option("The CSV file to write; standard output without it.")
 ]
 Precise = Annotated[bool, option("Calculate in double precision.")]
+Solver = Annotated[
+    Literal["columns", "single"],
+    option(
+        "How: columns for all orders of scattering, each column of air taken as flat "
+        "(suns well above the horizon); single for light that turned once."
+    ),
+]
 File = Annotated[Path, option("A scene file; see `atmos scene`.")]
 
 

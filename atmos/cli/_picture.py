@@ -9,15 +9,13 @@ import numpy as np
 from .. import colour, image
 from ..camera import AbstractCamera, LatLong
 from ..disk import render_disks
-from ..quantity import km
 from ..render import render
 from ..scene import Scene
-from ..solver import QUICK, SingleScattering
 from ._app import app, CAMERA, flat, option, OUTPUT, refuse, SUN, WORLD
 from ._lamp import header, measure_lamp
-from ._options import Files, observed, SunPosition, View, World
+from ._options import Files, observed, Solver, SunPosition, View, World
 from ._session import progress_bar, start
-from ._world import make_scene, solve_file
+from ._world import make_scene, solve_file, solver_named
 
 
 _LARGEST_HALF = 65504.0
@@ -28,6 +26,7 @@ def sky(
     scene: Annotated[Path | None, option("A scene file instead of a world.")] = None,
     /,
     *,
+    solver: Solver = "single",
     world: Annotated[World | None, flat(WORLD)] = None,
     sun: Annotated[SunPosition | None, flat(SUN)] = None,
     view: Annotated[View | None, flat(CAMERA)] = None,
@@ -47,7 +46,7 @@ def sky(
 
     atmos sky --world mars --projection perspective --azimuth 40 --output mars.exr
 
-    atmos sky my.toml --no-sun --half --colour-space acescg
+    atmos sky my.toml --no-sun --half --colour-space acescg --solver columns
     """
     world, sun, view = world or World(), sun or SunPosition(), view or View()
     files = files or Files()
@@ -57,13 +56,14 @@ def sky(
     wavelength = np.array(files.wavelength, np.float32)
     step = (wavelength[-1] - wavelength[0]) / max(1, wavelength.size - 1) or 10.0
     found = make_scene(scene, world, sun, float(step))
-    camera = view.camera()
-    write_picture(found, scene, camera, wavelength, files, preview, observed(sun, view))
+    said = observed(sun, view)
+    write_picture(found, scene, solver, view.camera(), wavelength, files, preview, said)
 
 
 def write_picture(
     scene: Scene,
     path: Path | None,
+    method: str,
     camera: AbstractCamera,
     wavelength: np.ndarray,
     files: Files,
@@ -79,8 +79,7 @@ def write_picture(
     bands = jnp.asarray(wavelength)
     weights = colour.response(bands) if seen else None
     response = None if spectral else space.from_xyz(weights)
-    # From above, rays pass more edges of media than the quick solver tells apart.
-    solver = QUICK if camera.position[2] < 20 * km else SingleScattering()
+    solver = solver_named(method, float(camera.position[2]))
     sky = solve_file(scene, solver, bands, path)
 
     # First what may be refused.

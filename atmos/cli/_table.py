@@ -4,7 +4,7 @@ import math
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import equinox as eqx
 import numpy as np
@@ -19,13 +19,14 @@ from ..rays import (
     radiances,
 )
 from ..scenefile import load
-from ._app import app, numbers_option, option, refuse
+from ._app import app, numbers_option, refuse
 from ._options import (
     Altitudes,
     check_output,
     File,
     Output,
     Precise,
+    Solver,
     Wavelengths,
     Zeniths,
 )
@@ -38,7 +39,7 @@ def radiance(
     scene: File,
     /,
     *,
-    solver: Annotated[Literal["single"], option("How: scattered once.")] = "single",
+    solver: Solver = "single",
     sun_zenith: Annotated[
         tuple[float, ...] | None,
         numbers_option("Zenith angles of the sun, in degrees.", 0, 180),

@@ -10,10 +10,18 @@ from jaxtyping import ArrayLike
 
 from ..light import SOLAR_RADIUS, Sun, sunlight
 from ..particle.surface import albedo
+from ..quantity import km
 from ..rays import direction
 from ..scene import earth, mars, Scene
 from ..scenefile import load, opac
-from ..solver import AbstractSolver, SingleScattering, solve, SolvedSky
+from ..solver import (
+    AbstractSolver,
+    Columns,
+    QUICK,
+    SingleScattering,
+    solve,
+    SolvedSky,
+)
 from ..spectrum import AbstractSpectrum, Constant
 from ._app import refuse
 from ._options import SunPosition, World
@@ -100,9 +108,14 @@ def about(options: dict[str, str]) -> Iterator[None]:
         raise ValueError(text) from error
 
 
-def solver_named(name: str) -> AbstractSolver:
-    """The solver of that name, at its finest."""
-    return {"single": SingleScattering}[name]()
+def solver_named(name: str, altitude: float | None = None) -> AbstractSolver:
+    """The solver of that name, at its finest; or for pictures from an altitude.
+
+    From high above, rays pass more edges of media than the quick solver tells apart.
+    """
+    quick = altitude is not None and altitude < 20.0 * km
+    single = QUICK if quick else SingleScattering()
+    return Columns(single=single) if name == "columns" else single
 
 
 def solve_file(

@@ -37,16 +37,16 @@ _ENOUGH = [
 _HIGH = 20.0 * km  # from here on up the thick air is a thin line
 
 
-def fine_enough(altitude: float, lowest: float) -> Resolution:
+def fine_enough(altitude: float, lowest: float, around: int) -> Resolution:
     """The grid that shows a sky to about 1e-3.
 
-    For an observer's altitude in m and the zenith angle of the lowest light, in rad, as
-    it is where the horizon is.
+    For an observer's altitude in m, and the zenith angle of the lowest light, in rad,
+    as it is where the horizon is; with no fewer azimuths than `around`.
     """
     size = next(size for most, size in _ENOUGH if lowest <= most)
-    if altitude <= _HIGH:
-        return size
-    return Resolution(192, 48, 2 * size.around - 1)
+    if altitude > _HIGH:
+        size = Resolution(192, 48, 2 * size.around - 1)
+    return Resolution(size.above, size.below, max(size.around, around))
 
 
 class Grid(eqx.Module):
@@ -224,7 +224,9 @@ class Panorama(eqx.Module):
     def even(self) -> bool:
         """Whether no phase function depends on the wavelength."""
         here = jax.ShapeDtypeStruct((), self.wavelength.dtype)
-        look = lambda versine: [x.evaluate(versine, self.wavelength) for x in self.phases]
+        look = lambda versine: [
+            x.evaluate(versine, self.wavelength) for x in self.phases
+        ]
         return all(x.shape == (1,) for x in jax.eval_shape(look, here))
 
     def weigh(self, response: Float[Array, "wl channel"]) -> "Panorama":

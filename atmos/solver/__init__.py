@@ -3,4 +3,11 @@ from ._base import (
     solve as solve,
     SolvedSky as SolvedSky,
 )
+from .columns import Columns as Columns, Fluxes as Fluxes
+from .path_tracing import (
+    Estimate as Estimate,
+    estimate as estimate,
+    PathTracing as PathTracing,
+    Tally as Tally,
+)
 from .single_scattering import QUICK as QUICK, SingleScattering as SingleScattering

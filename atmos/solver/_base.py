@@ -1,6 +1,6 @@
 import abc
 import math
-from typing import Any
+from typing import Any, ClassVar
 
 import equinox as eqx
 import jax
@@ -25,7 +25,15 @@ from ..sky import AbstractSky, fine_enough, Grid, Panorama, Resolution
 
 
 class AbstractSolver(eqx.Module):
-    """A way to find the light in a scene."""
+    """A way to find the light in a scene.
+
+    By day, what it finds varies little between `around` azimuths on half a circle.
+    """
+
+    around: ClassVar[int]
+
+    def check(self, scene: Scene) -> None:
+        """Raises `ValueError` for a scene that the method does not hold for."""
 
     @abc.abstractmethod
     def prepare(self, scene: Scene, wavelength: Wavelength) -> PyTree[Any]:
@@ -79,7 +87,8 @@ class SolvedSky(AbstractSky):
             )
         dip, _ = self._edges(position[2])
         lowest = max((_known(x.zenith + dip) for x in self.scene.lights), default=0.0)
-        return _tabulate(self, position, fine_enough(_known(position[2]), lowest))
+        size = fine_enough(_known(position[2]), lowest, self.solver.around)
+        return _tabulate(self, position, size)
 
     def _edges(self, altitude):
         """How far the horizon lies below level; the zenith angle where air begins."""
@@ -102,17 +111,75 @@ def _known(x: Number) -> float:
     return math.inf if isinstance(x, Tracer) else float(x)
 
 
-@eqx.filter_jit
+# Directions that are looked at together: grids of all sizes share a compilation.
+_TOGETHER = 144
+
+
 def _tabulate(sky: SolvedSky, position: Position, resolution: Resolution) -> Panorama:
     """The sky on a grid of directions, one light after the other."""
+    grid, phases, sides, zenith, azimuth = _frame(sky, position, resolution)
+    size = resolution.above + resolution.below, resolution.around
+
+    def table(light):
+        look = lambda x: _looks(sky, light, position, *x)
+        if any(isinstance(x, Tracer) for x in jax.tree.leaves((sky, position))):
+            # A gradient would else keep every place on every ray.
+            found = jax.lax.map(jax.checkpoint(look), (zenith, azimuth))
+        else:
+            found = jnp.stack([look(x) for x in zip(zenith, azimuth, strict=True)])
+        found = found.reshape(-1, *found.shape[2:])[: math.prod(size)]
+        return found.reshape(*size, *found.shape[1:])
+
+    tables = [table(x) for x in sky.scene.lights]
+    none = jnp.zeros((0, *size, len(phases) + 1, sky.wavelength.size), zenith.dtype)
+    return Panorama(
+        grid=grid,
+        table=jnp.stack(tables) if tables else none,
+        light_zenith=sides[0],
+        light_azimuth=sides[1],
+        phases=phases,
+        wavelength=sky.wavelength,
+    )
+
+
+@eqx.filter_jit
+def _frame(
+    sky: SolvedSky, position: Position, resolution: Resolution
+) -> tuple[Any, ...]:
+    """The grid, the phase functions to put on, where the lights stand; directions."""
     dip, first = sky._edges(position[2])
     grid = Grid(first, 0.5 * math.pi + dip, resolution)
-    lights, media = sky.scene.lights, sky.scene.scattering_media
-    terms = [x.phase.terms(sky.wavelength) for x in media]
+    angles = jnp.meshgrid(grid.zeniths(), grid.azimuths(), indexing="ij")
+    missing = -angles[0].size % _TOGETHER
+    blocks = [
+        jnp.pad(x.ravel(), (0, missing), mode="edge").reshape(-1, _TOGETHER)
+        for x in angles
+    ]
+    terms = [x.phase.terms(sky.wavelength) for x in sky.scene.scattering_media]
+    phases = [x for mixture in terms for x, _ in mixture]
+    phases = [x for x in phases if not isinstance(x, Isotropic)]
+    lights = sky.scene.lights
+    sides = [[x.zenith for x in lights], [x.azimuth for x in lights]]
+    return grid, tuple(phases), jnp.array(sides, dip.dtype), *blocks
 
-    def look(light, zenith, azimuth):
+
+@eqx.filter_jit
+def _looks(
+    sky: SolvedSky,
+    light: Sun,
+    position: Position,
+    zenith: Float[Array, "ray"],
+    azimuth: Float[Array, "ray"],
+) -> Float[Array, "ray part wl"]:
+    """What one sees by one light, in azimuths relative to it, for a panorama's table.
+
+    Parts whose phase function is isotropic, or partly so, join the last one.
+    """
+    terms = [x.phase.terms(sky.wavelength) for x in sky.scene.scattering_media]
+    east, north = light.horizontal
+
+    def look(zenith, azimuth):
         ahead, aside = jnp.cos(azimuth), jnp.sin(azimuth)
-        east, north = light.horizontal
         level = [east * ahead + north * aside, north * ahead - east * aside]
         up, flat = jnp.cos(zenith), jnp.sin(zenith)
         direction = jnp.stack([flat * level[0], flat * level[1], up])
@@ -126,25 +193,7 @@ def _tabulate(sky: SolvedSky, position: Position, resolution: Resolution) -> Pan
                     parts.append(weight * part)
         return jnp.stack([*parts, rest])
 
-    def table(light):
-        ring = jax.vmap(look, (None, None, 0))
-        # A gradient would else keep every place on every ray.
-        rings = jax.checkpoint(lambda zenith: ring(light, zenith, grid.azimuths()))
-        return jax.lax.map(rings, grid.zeniths(), batch_size=16)
-
-    phases = [
-        x for mixture in terms for x, _ in mixture if not isinstance(x, Isotropic)
-    ]
-    shape = (0, resolution.above + resolution.below, resolution.around)
-    none = jnp.zeros((*shape, len(phases) + 1, *sky.wavelength.shape), dip.dtype)
-    return Panorama(
-        grid=grid,
-        table=jnp.stack([table(x) for x in lights]) if lights else none,
-        light_zenith=jnp.array([x.zenith for x in lights], dip.dtype),
-        light_azimuth=jnp.array([x.azimuth for x in lights], dip.dtype),
-        phases=tuple(phases),
-        wavelength=sky.wavelength,
-    )
+    return jax.vmap(look)(zenith, azimuth)
 
 
 def solve(scene: Scene, solver: AbstractSolver, wavelength: ArrayLike) -> SolvedSky:
@@ -152,7 +201,7 @@ def solve(scene: Scene, solver: AbstractSolver, wavelength: ArrayLike) -> Solved
 
     All numbers take on the precision of `wavelength`. Raises `ValueError` unless the
     wavelengths are one-dimensional, lie between 100 nm and 100 um, and every table of
-    the scene covers them.
+    the scene covers them; and for a scene that the solver does not hold for.
     """
     nm = as_float(wavelength)
     if nm.ndim != 1:
@@ -162,9 +211,15 @@ def solve(scene: Scene, solver: AbstractSolver, wavelength: ArrayLike) -> Solved
         nm = eqx.error_if(nm, ~known, "`wavelength` must lie between 100 and 1e5 nm.")
     else:
         _check_wavelength(scene, np.asarray(nm))
+    solver.check(scene)
     scene = jax.tree.map(lambda x: x.astype(nm.dtype), scene)
-    prepared = solver.prepare(scene, nm)
+    prepared = _prepare(solver, scene, nm)
     return SolvedSky(scene=scene, solver=solver, wavelength=nm, prepared=prepared)
+
+
+@eqx.filter_jit
+def _prepare(solver: AbstractSolver, scene: Scene, wavelength: Wavelength):
+    return solver.prepare(scene, wavelength)
 
 
 def _check_wavelength(scene: Scene, wavelength: np.ndarray) -> None:

@@ -1,4 +1,5 @@
 import math
+from typing import ClassVar
 
 import equinox as eqx
 import jax
@@ -28,6 +29,7 @@ class SingleScattering(AbstractSolver):
     shortest are joined.
     """
 
+    around: ClassVar[int] = 9
     nodes: int = eqx.field(static=True, default=10)
     light_nodes: int = eqx.field(static=True, default=8)
     pieces: int = eqx.field(static=True, default=28)

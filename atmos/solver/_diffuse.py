@@ -1,0 +1,129 @@
+"""Diffuse light as a field of moments, and what of it one sees."""
+
+import math
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..geometry import Point
+from ..light import Sun
+from ..optics import Mixture
+from ..quantity import Depth, Direction, Position, Wavelength
+from ..scene import Scene
+from ..transport import cumulative, enter, gauss_legendre
+from ._ordinates import harmonics, pairs
+from ._sight import contract, cut, densities
+from ._suns import AbstractSuns, zenith_angle
+
+
+class Field(eqx.Module):
+    """The moments of diffuse light over altitude, from the ground up, and suns.
+
+    Of a light of irradiance 1; `moments` as of `_ordinates.Diffuse`. `mixture` are the
+    media without their forward peaks, which the light does not notice.
+    """
+
+    mixture: Mixture
+    altitude: Float[Array, "level"]
+    suns: AbstractSuns
+    moments: Float[Array, "sun level pair wl"]
+    up: Float[Array, "sun level wl"]
+    down: Float[Array, "sun level wl"]
+
+    def _look(self, table: Array, light: Sun, point: Point) -> Array:
+        """A table at a place, by straight lines in altitude."""
+        i = jnp.searchsorted(self.altitude, point.altitude, side="right") - 1
+        i = jnp.clip(i, 0, len(self.altitude) - 2)
+        step = self.altitude[i + 1] - self.altitude[i]
+        x = (point.altitude - self.altitude[i]) / jnp.where(step > 0.0, step, 1.0)
+        x = jnp.clip(x, 0.0, 1.0)
+        zenith = zenith_angle(point.up, light.direction)
+        mixed = jnp.zeros_like(table[0, 0])
+        for sun, weight in zip(*self.suns.between(light, zenith), strict=True):
+            mixed += weight * ((1.0 - x) * table[sun, i] + x * table[sun, i + 1])
+        return mixed
+
+    def fluxes(self, light: Sun, point: Point) -> tuple[Depth, Depth]:
+        """Diffuse flux upwards and downwards, for a light of irradiance 1."""
+        return self._look(self.up, light, point), self._look(self.down, light, point)
+
+    def source(
+        self,
+        scattering: Float[Array, "l wl"],
+        point: Point,
+        light: Sun,
+        view: Direction,
+    ) -> Float[Array, "wl"]:
+        """What a metre adds to the light that arrives from direction `view`."""
+        count = scattering.shape[0]
+        l, m = pairs(count)
+        turn = harmonics(-jnp.dot(point.up, view), count)[l, m]
+        turn = turn * _cosines(point.up, view, light.direction, count)[m]
+        turn = turn * jnp.asarray(l + 0.5, turn.dtype)
+        moments = self._look(self.moments, light, point)
+        return jnp.sum(turn[:, None] * scattering[l] * moments, 0)
+
+    def gather(
+        self,
+        scene: Scene,
+        light: Sun,
+        wavelength: Wavelength,
+        position: Position,
+        direction: Direction,
+        *,
+        pieces: int,
+        nodes: int,
+    ) -> Float[Array, "wl"]:
+        """Light of more than one turn from along a line of sight, and from its end."""
+        path, far, grounded = enter(scene, position, direction)
+        extinction = self.mixture.extinction
+        begin, length = cut(scene, path, far, extinction, pieces)
+        u, w = (jnp.asarray(x, far.dtype) for x in gauss_legendre(nodes))
+        inner = jnp.asarray(cumulative(nodes), far.dtype)
+
+        def piece(passed, interval):
+            begin, length = interval
+            points = jax.vmap(path.at)(begin + length * u)
+            density = jax.vmap(lambda x: densities(scene, x))(points)
+            lost = length * contract("jm,ml->jl", density, extinction)
+            scattering = contract("jm,mkl->jkl", density, self.mixture.scattering)
+            shine = lambda s, x: self.source(s, x, light, direction)
+            source = length * jax.vmap(shine)(scattering, points)
+            depth, within = (
+                contract("j,jl->l", w, lost),
+                contract("ij,jl->il", inner, lost),
+            )
+            # The rule by Gauss, made exact for light that is everywhere the same.
+            share = w[:, None] * jnp.exp(within[:1] - within)
+            even = jnp.sum(share * lost, 0)
+            empty = even <= 0.0
+            whole = -jnp.expm1(-depth) / jnp.where(empty, 1.0, even)
+            whole = jnp.where(empty, 1.0, whole)
+            seen = jnp.exp(-passed) * whole * jnp.sum(share * source, 0)
+            return passed + depth, seen
+
+        passed, seen = jax.lax.scan(piece, jnp.zeros_like(wavelength), (begin, length))
+        foot = path.at(far)
+        foot = Point(foot.position, jnp.zeros_like(far), foot.up)
+        _, down = self.fluxes(light, foot)
+        ground = scene.ground.evaluate(wavelength) / math.pi * down * jnp.exp(-passed)
+        total = jnp.sum(seen, 0) + jnp.where(grounded, ground, 0.0)
+        return total * light.irradiance.evaluate(wavelength)
+
+
+def _cosines(
+    up: Direction, view: Direction, sun: Direction, count: int
+) -> Float[Array, "m"]:
+    """Of multiples of the azimuth between two directions; 1 where it is not known."""
+    view, sun = (x - jnp.dot(up, x) * up for x in (view, sun))
+    squared = jnp.dot(view, view) * jnp.dot(sun, sun)
+    known = squared > float(jnp.finfo(up.dtype).tiny)
+    root = jnp.sqrt(jnp.where(known, squared, 1.0))
+    cosine = jnp.where(known, jnp.dot(view, sun) / root, 1.0)
+    cosine = jnp.clip(cosine, -1.0, 1.0)
+    found = [jnp.ones_like(cosine), cosine]
+    for _ in range(count - 2):
+        found.append(2.0 * cosine * found[-1] - found[-2])
+    return jnp.stack(found[:count])

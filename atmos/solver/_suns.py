@@ -1,0 +1,95 @@
+"""The suns for which diffuse light is worked out."""
+
+import abc
+
+import equinox as eqx
+import jax.numpy as jnp
+from jax.lax import stop_gradient
+from jaxtyping import Array, Float, Int
+
+from ..light import Sun
+from ..quantity import Angle, deg, Direction
+
+
+class AbstractSuns(eqx.Module):
+    """The zenith angles of the sun for which the light is known."""
+
+    @abc.abstractmethod
+    def zeniths(self) -> Float[Array, "sun"]:
+        """In rad."""
+
+    @abc.abstractmethod
+    def between(
+        self, light: Sun, zenith: Angle
+    ) -> tuple[Int[Array, "k"], Float[Array, "k"]]:
+        """Which of them to mix, and how much of each, where a light stands so."""
+
+
+class FlatSuns(AbstractSuns):
+    """In a flat world a light stands alike everywhere."""
+
+    lights: Float[Array, "sun"]
+
+    def zeniths(self) -> Float[Array, "sun"]:
+        return self.lights
+
+    def between(
+        self, light: Sun, zenith: Angle
+    ) -> tuple[Int[Array, "1"], Float[Array, "1"]]:
+        return _nearest(self.lights, light)[None], jnp.ones_like(zenith)[None]
+
+
+# The distance from a light's zenith angle within which others lie evenly.
+_CLOSE = 6.0 * deg
+
+
+class RoundSuns(AbstractSuns):
+    """In a round world a light stands otherwise elsewhere, by a little nearby.
+
+    For each light `count` zenith angles, from 0 to the `last` at which any air is lit,
+    that crowd around the light's own, joined by cubics.
+    """
+
+    lights: Float[Array, "light"]
+    last: Angle
+    count: int = eqx.field(static=True)
+
+    def _ends(self) -> tuple[Array, Array, Array]:
+        centre = jnp.clip(self.lights, 0.0, self.last)
+        lowest = jnp.arcsinh(-centre / _CLOSE)
+        return centre, lowest, jnp.arcsinh((self.last - centre) / _CLOSE)
+
+    def zeniths(self) -> Float[Array, "sun"]:
+        centre, low, high = (x[:, None] for x in self._ends())
+        t = jnp.linspace(0.0, 1.0, self.count, dtype=self.last.dtype)[None]
+        found = centre + _CLOSE * jnp.sinh(low + (high - low) * t)
+        return jnp.clip(found, 0.0, self.last).ravel()
+
+    def between(
+        self, light: Sun, zenith: Angle
+    ) -> tuple[Int[Array, "4"], Float[Array, "4"]]:
+        which = _nearest(self.lights, light)
+        centre, low, high = (x[which] for x in self._ends())
+        t = jnp.arcsinh((jnp.clip(zenith, 0.0, self.last) - centre) / _CLOSE)
+        t = (t - low) / (high - low) * (self.count - 1)
+        first = jnp.clip(jnp.floor(stop_gradient(t)) - 1.0, 0.0, self.count - 4.0)
+        x = t - first
+        a, b, c = x - 1.0, x - 2.0, x - 3.0
+        weights = [-a * b * c / 6.0, x * b * c / 2.0, -x * a * c / 2.0, x * a * b / 6.0]
+        first = first.astype(jnp.int32) + which * self.count
+        return first + jnp.arange(4, dtype=jnp.int32), jnp.stack(weights)
+
+
+def _nearest(lights: Float[Array, "light"], light: Sun) -> Int[Array, ""]:
+    return jnp.argmin(jnp.abs(lights - light.zenith)).astype(jnp.int32)
+
+
+def zenith_angle(up: Direction, direction: Direction) -> Angle:
+    """The angle between a direction and straight up, from 0 to pi."""
+    height = jnp.dot(up, direction)
+    level = direction - height * up
+    squared = jnp.dot(level, level)
+    aside = squared > 0.0
+    return jnp.arctan2(
+        jnp.where(aside, jnp.sqrt(jnp.where(aside, squared, 1.0)), 0.0), height
+    )

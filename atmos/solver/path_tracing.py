@@ -1,0 +1,182 @@
+import dataclasses
+from typing import ClassVar
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float, Integer, PRNGKeyArray, Scalar
+
+from ..light import Sun
+from ..quantity import Direction, Number, Position, Radiance, Wavelength
+from ..scene import Scene
+from ..transport import enter
+from ._base import AbstractSolver, SolvedSky
+from ._collision import Task
+from ._flight import Layers
+from ._guess import prepare
+from ._walk import advance, begin
+from .single_scattering import SingleScattering
+
+
+class Tally(eqx.Module):
+    """The mean of independent trials, and how much they scatter about it.
+
+    `squares` is the sum of the squared distances from the mean.
+    """
+
+    count: Number
+    mean: Float[Array, "*batch wl"]
+    squares: Float[Array, "*batch wl"]
+
+    @classmethod
+    def of(cls, trials: Float[Array, "trial *batch wl"]) -> "Tally":
+        mean = jnp.mean(trials, 0)
+        squares = jnp.sum((trials - mean[None]) ** 2, 0)
+        return cls(jnp.asarray(trials.shape[0], mean.dtype), mean, squares)
+
+    def join(self, other: "Tally") -> "Tally":
+        """That of both together (Chan, Golub and LeVeque 1983)."""
+        count = self.count + other.count
+        part = other.count / count
+        apart = other.mean - self.mean
+        squares = self.squares + other.squares + self.count * part * apart * apart
+        return Tally(count, self.mean + part * apart, squares)
+
+    @property
+    def standard_error(self) -> Float[Array, "*batch wl"]:
+        return jnp.sqrt(self.squares / (self.count * (self.count - 1.0)))
+
+
+class PathTracing(AbstractSolver):
+    """Light that turned any number of times, by random paths: right on average.
+
+    Paths are followed backwards, from the eye, in `blocks` of `walks` times `paths`.
+    The paths of a walk share out the first flight evenly; walks are independent, and
+    the standard error is taken from how they differ. One more block changes nothing in
+    those before: all is decided by `key`. Light that turned once comes from `single`;
+    with None it is traced too. Suns are points. Media depend on altitude alone:
+    `prepare` raises `ValueError` otherwise.
+    """
+
+    around: ClassVar[int] = 17
+    key: PRNGKeyArray = eqx.field(default_factory=lambda: jax.random.key(0))
+    blocks: int = eqx.field(static=True, default=1)
+    walks: int = eqx.field(static=True, default=256)
+    paths: int = eqx.field(static=True, default=64)
+    single: SingleScattering | None = SingleScattering()
+
+    def __check_init__(self):
+        for name, least in [("blocks", 1), ("walks", 2), ("paths", 1)]:
+            if getattr(self, name) < least:
+                raise ValueError(
+                    f"`{name}` must be at least {least}; got {getattr(self, name)}."
+                )
+
+    def prepare(self, scene: Scene, wavelength: Wavelength) -> Layers:
+        return prepare(scene, wavelength)
+
+    def scattered(
+        self,
+        prepared: Layers,
+        scene: Scene,
+        light: Sun,
+        wavelength: Wavelength,
+        position: Position,
+        direction: Direction,
+    ) -> Float[Array, "part wl"]:
+        looks = position[None], direction[None]
+        tally = self.tally(prepared, scene, light, wavelength, *looks)
+        if self.single is None:
+            media = len(scene.scattering_media)
+            parts = jnp.zeros((media + 1, *wavelength.shape), wavelength.dtype)
+        else:
+            parts = self.single.scattered(
+                None, scene, light, wavelength, position, direction
+            )
+        return parts.at[-1].add(tally.mean[0])
+
+    def tally(
+        self,
+        prepared: Layers,
+        scene: Scene,
+        light: Sun,
+        wavelength: Wavelength,
+        positions: Float[Array, "look 3"],
+        directions: Float[Array, "look 3"],
+        first: Integer[Scalar, ""] | int = 0,
+    ) -> Tally:
+        """What the paths find in each direction, in blocks from the `first` on."""
+        once = 1 if self.single is None else 2
+        task = Task(scene, prepared, light, wavelength, once)
+        # Compiled once, for any number of blocks.
+        alike = dataclasses.replace(self, blocks=1, single=None)
+        blocks = jnp.int32(self.blocks)
+        return _tally(alike, task, positions, directions, jnp.int32(first), blocks)
+
+
+@eqx.filter_jit
+def _tally(
+    solver: PathTracing,
+    task: Task,
+    positions: Float[Array, "look 3"],
+    directions: Float[Array, "look 3"],
+    first: Integer[Scalar, ""],
+    blocks: Integer[Scalar, ""],
+) -> Tally:
+    paths, _, _ = jax.vmap(enter, (None, 0, 0))(task.scene, positions, directions)
+    irradiance = task.light.irradiance.evaluate(task.wavelength) / solver.paths
+
+    def block(index, tally):
+        key = jax.random.fold_in(solver.key, first + index)
+        keys = jax.random.split(key, (solver.walks, *positions.shape[:1]))
+        by_look = jax.vmap(begin, (None, 0, 0, 0, None))
+        by_walk = jax.vmap(by_look, (None, None, None, 0, None))
+        walks = by_walk(task, paths.start, directions, keys, solver.paths)
+        onwards = jax.vmap(jax.vmap(lambda x: advance(task, x)))
+        left = lambda x: jnp.any(x.left > 0)
+        found = jax.lax.while_loop(left, onwards, walks).total
+        return tally.join(Tally.of(found * irradiance[None, None]))
+
+    dark = jnp.zeros((*positions.shape[:1], *task.wavelength.shape), directions.dtype)
+    none = Tally(jnp.zeros_like(irradiance, shape=()), dark, dark)
+    return jax.lax.fori_loop(0, blocks, block, none)
+
+
+class Estimate(eqx.Module):
+    """A radiance, and how far it is likely to be off."""
+
+    mean: Radiance
+    standard_error: Radiance
+
+
+@eqx.filter_jit
+def estimate(sky: SolvedSky, position: Position, direction: Direction) -> Estimate:
+    """What one sees, with its standard error.
+
+    Raises `ValueError` for a sky that is not path traced.
+    """
+    solver = sky.solver
+    if not isinstance(solver, PathTracing):
+        raise ValueError(f"`sky` must be traced by paths; got {type(solver).__name__}.")
+    total = jnp.zeros_like(sky.wavelength)
+    mean, variance = total, total
+    for light in sky.scene.lights:
+        tally = solver.tally(
+            sky.prepared,
+            sky.scene,
+            light,
+            sky.wavelength,
+            position[None],
+            direction[None],
+        )
+        mean += tally.mean[0]
+        variance += tally.standard_error[0] ** 2
+    if solver.single is not None:
+        once = SolvedSky(
+            scene=sky.scene,
+            solver=solver.single,
+            wavelength=sky.wavelength,
+            prepared=None,
+        )
+        mean += once.radiance(position, direction)
+    return Estimate(mean, jnp.sqrt(variance))

@@ -1,0 +1,240 @@
+"""Light of all orders in flat columns: published slabs, closed forms, and its laws."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from atmos.geometry import Flat, Spherical
+from atmos.light import Sun
+from atmos.medium import Medium, Uniform
+from atmos.phase import HenyeyGreenstein
+from atmos.scene import Scene
+from atmos.solver import Columns, SingleScattering, solve
+
+
+NM = np.array([500.0])
+DEEP = 1000.0
+SOLVER = Columns(layers=32)
+ONCE = SingleScattering()
+
+
+def world(geometry, depth, albedo, g, cosine, ground, cut):
+    """Two slabs of the same stuff, one on the other, under a sun of irradiance 1."""
+    media = tuple(
+        Medium(
+            Uniform(low * DEEP, high * DEEP),
+            depth * albedo / DEEP,
+            depth * (1.0 - albedo) / DEEP,
+            HenyeyGreenstein(g),
+        )
+        for low, high in ((0.0 * cut, cut), (cut, 1.0 + 0.0 * cut))
+    )
+    sun = jnp.stack([jnp.sqrt(1.0 - cosine**2), jnp.zeros_like(cosine), cosine])
+    return Scene(geometry, DEEP, media, (Sun(sun, 1.0, 0.0),), ground)
+
+
+def towards(cosine, azimuth):
+    level = np.sqrt(1.0 - np.square(cosine))
+    flat = [level * np.cos(azimuth), level * np.sin(azimuth)]
+    return np.stack([*flat, cosine + 0.0 * flat[0]], -1)
+
+
+COSINES = np.array([-1.0, -0.7, -0.3, -0.05, 0.05, 0.3, 0.7, 1.0])
+AZIMUTHS = np.array([0.0, 0.7, 2.0, np.pi])
+VIEWS = towards(COSINES[:, None], AZIMUTHS[None]).reshape(-1, 3)
+HEIGHTS = np.array([0.0, 0.5, 1.0]) * DEEP
+
+
+@eqx.filter_jit
+def fluxes(numbers):
+    """Up, diffuse and direct at the bottom, in the middle and at the top."""
+    scene = world(Flat(), *numbers)
+    sky = solve(scene, SOLVER, jnp.asarray(NM, numbers.dtype))
+    up = jnp.zeros((3, 3), numbers.dtype).at[:, 2].set(HEIGHTS.astype(numbers.dtype))
+    each = lambda at: SOLVER.fluxes(
+        sky.prepared, sky.scene, sky.scene.lights[0], sky.wavelength, at
+    )
+    found = jax.vmap(each)(up)
+    return found.up[:, 0], found.diffuse[:, 0], found.direct[:, 0]
+
+
+@eqx.filter_jit
+def looks(numbers, views, solver):
+    """Radiance at the same places, in every direction."""
+    sky = solve(world(Flat(), *numbers), solver, jnp.asarray(NM, numbers.dtype))
+    at = jnp.zeros((3, 3), numbers.dtype).at[:, 2].set(HEIGHTS.astype(numbers.dtype))
+    see = jax.vmap(jax.vmap(sky.radiance, (None, 0)), (0, None))
+    return see(at, views)[..., 0]
+
+
+def at(*numbers, cut=0.5, dtype=jnp.float64):
+    return jnp.asarray([*numbers, cut], dtype)
+
+
+def shares(*numbers):
+    """Reflected and transmitted flux, over what comes in."""
+    up, diffuse, direct = fluxes(at(*numbers))
+    return float(up[2] / direct[2]), float((diffuse[0] + direct[0]) / direct[2])
+
+
+@pytest.mark.parametrize(
+    "depth, albedo, g, cosine, reflected, transmitted",
+    [
+        # van de Hulst 1980, Multiple Light Scattering, tables 12 and 35.
+        (1.0, 1.0, 0.0, 1.0, 0.34133, 0.65867),
+        (1.0, 1.0, 0.5, 1.0, 0.17611, 0.82389),
+        (1.0, 0.9, 0.5, 1.0, None, 0.73909),
+        # The slab by which Monte Carlo codes for tissue are judged (Wang 1995).
+        (2.0, 0.9, 0.75, 1.0, 0.09739, 0.66096),
+        # CDISORT 2.1.3, 128 streams; where albedo 1 - 1e-12 has misled such codes.
+        (1.0, 1.0, 0.5, 0.6, 0.5870097 / (0.6 * np.pi), None),
+    ],
+)
+def test_slabs_are_as_published(depth, albedo, g, cosine, reflected, transmitted):
+    found = shares(depth, albedo, g, cosine, 0.0)
+    for got, due in zip(found, (reflected, transmitted), strict=True):
+        assert due is None or abs(got - due) < 2e-5
+
+
+@pytest.mark.parametrize("depth", [30.0, 100.0, 1000.0])
+def test_thick_clouds_pass_as_much_as_diffusion_theory_says(depth):
+    # Exact up to exp(-depth), van de Hulst 1980: 4/3 K(1) / (depth + 2 * 0.7104461),
+    # with K = 3^(1/2) H / 4 and H(1) = 2.9078105 (Chandrasekhar 1960).
+    due = np.sqrt(3.0) / 3.0 * 2.9078105 / (depth + 2.0 * 0.7104461)
+    reflected, transmitted = shares(depth, 1.0, 0.0, 1.0, 0.0)
+    assert abs(transmitted / due - 1.0) < 1e-4
+    assert abs(reflected + transmitted - 1.0) < 1e-10
+
+
+@pytest.mark.parametrize("depth", [0.0, 1e-12, 0.1, 10.0, 100.0, 1000.0])
+@pytest.mark.parametrize("g", [0.0, 0.85, 0.99])
+def test_what_is_not_absorbed_comes_back_from_white_ground(depth, g):
+    up, diffuse, direct = fluxes(at(depth, 1.0, g, 0.3, 1.0))
+    np.testing.assert_allclose(up, diffuse + direct, atol=1e-9, rtol=1e-9)
+    np.testing.assert_allclose(up[2], 0.3, rtol=1e-9)
+
+
+def test_the_ground_gets_what_it_reflects_again_and_again():
+    # Adding a Lambertian ground: T + a S T / (1 - a S), with S seen from below.
+    cosines, weights = np.polynomial.legendre.leggauss(24)
+    cosines, weights = 0.5 + 0.5 * cosines, 0.5 * weights
+    below = sum(
+        2.0 * w * c * shares(2.0, 0.9, 0.7, c, 0.0)[0]
+        for c, w in zip(cosines, weights, strict=True)
+    )
+    _, black = shares(2.0, 0.9, 0.7, 0.6, 0.0)
+    _, bright = shares(2.0, 0.9, 0.7, 0.6, 0.8)
+    assert abs(bright * (1.0 - 0.8 * below) / black - 1.0) < 1e-5
+
+
+def test_absorbers_show_the_ground_by_the_direct_sun_alone():
+    seen = np.asarray(looks(at(0.8, 0.0, 0.0, 0.6, 0.5), VIEWS, SOLVER))
+    cosines = np.abs(VIEWS[:, 2])
+    due = (
+        0.5 / np.pi * 0.6 * np.exp(-0.8 / 0.6 - np.outer(HEIGHTS / DEEP, 0.8 / cosines))
+    )
+    np.testing.assert_allclose(seen, np.where(VIEWS[:, 2] < 0.0, due, 0.0), rtol=1e-9)
+
+
+@pytest.mark.parametrize("depth", [1e-5, 1e-9, 1e-12])
+def test_thin_media_scatter_once(depth):
+    numbers = at(depth, 1.0, 0.6, 0.5, 0.0)
+    once, all_ = looks(numbers, VIEWS, ONCE), looks(numbers, VIEWS, SOLVER)
+    lit = np.asarray(once) > 0.0
+    assert lit.sum() == 64
+    assert np.abs(np.asarray(all_ / jnp.where(lit, once, 1.0))[lit] - 1.0).max() < 2e-4
+
+
+def test_a_sun_at_an_ordinate_is_like_any_other():
+    node = 0.5 + 0.5 * np.polynomial.legendre.leggauss(8)[0][4]
+    aside = np.array([0.0, 1e-12, 1e-9, 1e-6, 1e-4])
+    found = [shares(1.0, 0.9, 0.5, node * (1.0 + x), 0.0) for x in aside]
+    slope = (np.array(found[-1]) - found[0]) / aside[-1]
+    for x, got in zip(aside, found, strict=True):
+        np.testing.assert_allclose(got, found[0] + slope * x, atol=1e-8)
+
+
+@pytest.mark.parametrize("depth", [0.3, 3.0, 300.0])
+@pytest.mark.parametrize("g", [0.95, 0.99])
+def test_radiance_is_never_negative(depth, g):
+    seen = np.asarray(looks(at(depth, 1.0, g, 0.7, 0.2), VIEWS, SOLVER))
+    assert np.isfinite(seen).all() and seen.min() >= 0.0
+
+
+def test_a_cloud_over_snow_is_as_bright_from_all_sides():
+    # Nothing is lost, so it is nearly a white Lambertian one below.
+    seen = np.asarray(looks(at(100.0, 1.0, 0.85, 0.5, 1.0), VIEWS, SOLVER))
+    below = seen[0].reshape(8, 4)
+    assert np.ptp(below, axis=1).max() < 1e-4 * below.mean()
+    np.testing.assert_allclose(below, 0.5 / np.pi * np.ones((8, 4)), rtol=0.15)
+
+
+def test_light_goes_back_the_way_it_came():
+    one, other = at(0.7, 0.9, 0.6, 0.35, 0.3), at(0.7, 0.9, 0.6, 0.8, 0.3)
+    azimuths = np.resize([0.4, 1.3, 2.8], 32)
+    there = looks(one, towards(-0.8, azimuths), SOLVER)[2]
+    back = looks(other, towards(-0.35, azimuths), SOLVER)[2]
+    np.testing.assert_allclose(there * 0.8, back * 0.35, rtol=2e-3)
+
+
+def test_left_and_right_of_the_sun_are_alike():
+    numbers = at(0.7, 0.9, 0.6, 0.35, 0.3)
+    mirrored = looks(numbers, VIEWS * np.array([1.0, -1.0, 1.0]), SOLVER)
+    np.testing.assert_allclose(mirrored, looks(numbers, VIEWS, SOLVER), rtol=1e-9)
+
+
+def test_a_slab_may_be_cut_anywhere():
+    seen = looks(at(2.0, 0.95, 0.7, 0.4, 0.1), VIEWS, SOLVER)
+    again = looks(at(2.0, 0.95, 0.7, 0.4, 0.1, cut=0.81), VIEWS, SOLVER)
+    np.testing.assert_allclose(again, seen, rtol=3e-3)
+
+
+def test_single_precision_is_right_to_1e4():
+    numbers = 0.8, 0.9, 0.7, 0.6, 0.2
+    double = looks(at(*numbers), VIEWS, SOLVER)
+    single = looks(at(*numbers, dtype=jnp.float32), VIEWS.astype(np.float32), SOLVER)
+    np.testing.assert_allclose(single, double, rtol=1e-4, atol=1e-9)
+
+
+def test_gradients_agree_with_differences():
+    # That of radiance is left to `validation.columns`: it takes long to compile.
+    weights = np.linspace(1.0, 2.0, 3)
+
+    def total(numbers):
+        up, diffuse, _ = fluxes(numbers)
+        return jnp.sum(weights * (up + 2.0 * diffuse))
+
+    numbers = at(1.3, 0.95, 0.7, 0.6, 0.3)
+    slope = eqx.filter_jit(jax.grad(total))(numbers)
+    for i, step in enumerate(1e-5 * np.eye(6)[:5]):
+        due = (total(numbers + step) - total(numbers - step)) / 2e-5
+        assert abs(slope[i] / due - 1.0) < 1e-6, i
+
+
+def test_a_huge_planet_is_flat():
+    numbers = at(0.7, 0.9, 0.6, 0.7, 0.3)
+
+    @eqx.filter_jit
+    def seen(numbers):
+        sky = solve(world(Spherical(1e12), *numbers), SOLVER, NM)
+        place = jnp.array([0.0, 0.0, HEIGHTS[1]])
+        return jax.vmap(sky.radiance, (None, 0))(place, VIEWS)[:, 0]
+
+    flat = looks(numbers, VIEWS, SOLVER)[1]
+    np.testing.assert_allclose(seen(numbers), flat, rtol=1e-4)
+
+
+def test_more_edges_than_layers_are_refused():
+    with pytest.raises(ValueError, match="`layers` must be at least 5"):
+        solve(world(Flat(), *at(1.0, 1.0, 0.0, 0.5, 0.0)), Columns(layers=3), NM)
+
+
+def test_low_suns_in_a_round_world_are_refused():
+    sinking = lambda zenith: world(
+        Spherical(6.4e6), 0.1, 1.0, 0.0, jnp.cos(jnp.radians(zenith)), 0.0, 0.5
+    )
+    solve(sinking(84.9), SOLVER, NM)
+    with pytest.raises(ValueError, match="lights.0.. must stand 5 degrees .* got 4"):
+        solve(sinking(86.0), SOLVER, NM)
