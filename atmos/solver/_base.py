@@ -111,8 +111,9 @@ def _known(x: Number) -> float:
     return math.inf if isinstance(x, Tracer) else float(x)
 
 
-# Directions that are looked at together: grids of all sizes share a compilation.
-_TOGETHER = 144
+# Directions that are looked at together: grids of all sizes share a compilation. On a
+# CPU as many as fit into its cache.
+_TOGETHER, _TOGETHER_ON_CPU = 720, 144
 
 
 def _tabulate(sky: SolvedSky, position: Position, resolution: Resolution) -> Panorama:
@@ -150,9 +151,10 @@ def _frame(
     dip, first = sky._edges(position[2])
     grid = Grid(first, 0.5 * math.pi + dip, resolution)
     angles = jnp.meshgrid(grid.zeniths(), grid.azimuths(), indexing="ij")
-    missing = -angles[0].size % _TOGETHER
+    together = _TOGETHER_ON_CPU if jax.default_backend() == "cpu" else _TOGETHER
+    missing = -angles[0].size % together
     blocks = [
-        jnp.pad(x.ravel(), (0, missing), mode="edge").reshape(-1, _TOGETHER)
+        jnp.pad(x.ravel(), (0, missing), mode="edge").reshape(-1, together)
         for x in angles
     ]
     terms = [x.phase.terms(sky.wavelength) for x in sky.scene.scattering_media]
