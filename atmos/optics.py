@@ -8,7 +8,7 @@ from jaxtyping import Array, Float
 
 from .quantity import Length, Wavelength
 from .scene import Scene
-from .transport import extinctions, gauss_legendre
+from .transport import densities, extinctions, gauss_legendre
 
 
 class Mixture(eqx.Module):
@@ -56,12 +56,10 @@ class Layers(eqx.Module):
     column: Float[Array, "layer medium"]
 
 
-def densities(scene: Scene, altitude: Length) -> Float[Array, "medium"]:
-    """Of each medium straight above the origin."""
+def _above(scene: Scene, altitude: Length) -> Float[Array, "medium"]:
+    """How much there is of each medium straight above the origin."""
     position = jnp.zeros(3, altitude.dtype).at[2].set(altitude)
-    point = scene.geometry.locate(position)
-    found = [x.profile.density(point) for x in scene.media]
-    return jnp.stack(found) if found else jnp.zeros(0, altitude.dtype)
+    return densities(scene, scene.geometry.locate(position))
 
 
 def layers(scene: Scene, extinction: Float[Array, "medium wl"], count: int) -> Layers:
@@ -90,7 +88,7 @@ def _columns(
 ) -> Float[Array, "*n medium"]:
     u, w = (jnp.asarray(x, low.dtype) for x in gauss_legendre(nodes))
     inside = low[..., None] + jnp.multiply.outer(thickness, u)
-    found = jax.vmap(lambda x: densities(scene, x))(inside.ravel())
+    found = jax.vmap(lambda x: _above(scene, x))(inside.ravel())
     found = found.reshape(*inside.shape, -1)
     return jnp.sum(found * jnp.multiply.outer(thickness, w)[..., None], -2)
 

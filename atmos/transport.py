@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
-from .geometry import AbstractPath
+from .geometry import AbstractPath, Point
 from .light import Sun
 from .medium import AbstractProfile
 from .quantity import (
@@ -79,6 +79,17 @@ def columns(
     """The column of every medium between the start of a ray, in the air, and `far`."""
     found = [column(x.profile, path, far, nodes=nodes) for x in scene.media]
     return jnp.stack(found) if found else jnp.zeros(0, far.dtype)
+
+
+def contract(product: str, *terms: Array) -> Array:
+    """A sum of products, in full precision."""
+    return jnp.einsum(product, *terms, precision="highest")
+
+
+def densities(scene: Scene, point: Point) -> Float[Array, "medium"]:
+    """How much there is of each medium, relative to its coefficients."""
+    found = [x.profile.density(point) for x in scene.media]
+    return jnp.stack(found) if found else jnp.zeros(0, point.altitude.dtype)
 
 
 def extinctions(scene: Scene, wavelength: Wavelength) -> Float[Array, "medium wl"]:

@@ -12,6 +12,7 @@ from jaxtyping import Array, Float, Int
 
 from ..phase import AbstractPhaseFunction
 from ..quantity import Angle, deg, km, Wavelength
+from ..transport import contract
 
 
 # Rings keep this far off the horizon, so that rounding leaves no doubt on which side.
@@ -178,7 +179,7 @@ class Panorama(eqx.Module):
         count = jnp.where(grounded, float(size.below), float(size.above))
         place, weights = _cubic(grid.ring(zenith), low, low + count - 1.0)
         mixing = _matrix(place, weights, size.above + size.below)
-        rings = _product("hr,rapl->hapl", mixing, table)
+        rings = contract("hr,rapl->hapl", mixing, table)
         return jnp.pad(rings, ((0, 0), (1, 1), (0, 0), (0, 0)), mode="reflect")
 
     def _mixing(self, relative):
@@ -195,13 +196,13 @@ class Panorama(eqx.Module):
         factor = factor[..., :, None] * mixing[None, :, None, :]
         height, width, *_ = factor.shape
         rows = jnp.moveaxis(rings[:, :, jnp.array(even)], 2, 1)
-        total = _product(
+        total = contract(
             "hwk,hkl->hwl",
             factor.reshape(height, width, -1),
             rows.reshape(height, -1, rows.shape[-1]),
         )
         for i in set(range(len(weights))) - set(even):
-            total += weights[i] * _product("wa,hal->hwl", mixing, rings[:, :, i])
+            total += weights[i] * contract("wa,hal->hwl", mixing, rings[:, :, i])
         return total
 
     def _pixels(self, table, zenith, relative, weights):
@@ -234,7 +235,7 @@ class Panorama(eqx.Module):
 
         Right only where `even`.
         """
-        table = _product("nrapl,lc->nrapc", self.table, response)
+        table = contract("nrapl,lc->nrapc", self.table, response)
         return eqx.tree_at(lambda x: x.table, self, table)
 
     def finer(self) -> "Panorama":
@@ -248,12 +249,8 @@ class Panorama(eqx.Module):
         grid = Grid(self.grid.first, self.grid.horizon, size)
         mixing = self._mixing(grid.azimuths())
         rings = jax.vmap(lambda x: self._rings(x, grid.zeniths()))(self.table)
-        table = _product("wa,nhapl->nhwpl", mixing, rings)
+        table = contract("wa,nhapl->nhwpl", mixing, rings)
         return eqx.tree_at(lambda x: (x.grid, x.table), self, (grid, table))
-
-
-def _product(names: str, *terms: Array) -> Array:
-    return jnp.einsum(names, *terms, precision="highest")
 
 
 def versine_between(

@@ -11,9 +11,9 @@ from ..geometry import Point
 from ..light import Sun
 from ..quantity import Direction, Number, Versine, versine, Wavelength
 from ..scene import Scene
-from ..transport import gauss_legendre
+from ..transport import densities, gauss_legendre
 from . import _directions as directions
-from ._flight import cell, densities, dot, Flight, Layers, NODES, share
+from ._flight import cell, dot, Flight, Layers, NODES, share
 
 
 # The shares of flights to where it is guessed to be bright, and of turns towards where
@@ -186,8 +186,10 @@ def depart(
 
     upto = jnp.cumsum(whence[:, hero])
     chosen = jnp.minimum(jnp.sum(upto <= u[0] * upto[-1]), count - 1)
-    led = jnp.where(order < _LED, _TURNS, 0.0)
-    guided = ~place.grounded & (u[3] < led)
+    # What turns little goes where the guess points too seldom to be led there.
+    spread = 1.0 - jnp.sum(place.mixture * layers.forward, 0)
+    led = jnp.where(order < _LED, _TURNS * spread * spread, 0.0)
+    guided = ~place.grounded & (u[3] < led[hero])
     direction = jnp.where(guided, directions.draw(chosen, u[1:3], up, sun), turned)
     turns = phase(task, place.mixture, versine(along, direction))
     known = whence[directions.sort(direction, up, sun)] * (count * 0.25 / math.pi)

@@ -12,9 +12,9 @@ from ..light import Sun
 from ..optics import Mixture
 from ..quantity import Depth, Direction, Position, Wavelength
 from ..scene import Scene
-from ..transport import cumulative, enter, gauss_legendre
+from ..transport import contract, cumulative, densities, enter, gauss_legendre
 from ._ordinates import harmonics, pairs
-from ._sight import contract, cut, densities
+from ._sight import cut
 from ._suns import AbstractSuns, zenith_angle
 
 

@@ -8,7 +8,7 @@ from jaxtyping import Array, Bool, Float, Integer
 from ..geometry import AbstractPath, Point
 from ..quantity import Direction, Length
 from ..scene import Scene
-from ..transport import columns, gauss_legendre
+from ..transport import columns, densities, gauss_legendre
 
 
 # Nodes a piece, and on the way to the sun: optical depths right to 1e-6.
@@ -20,16 +20,18 @@ SUNS = 64
 class Layers(eqx.Module):
     """A scene cut at altitudes, and a guess of how bright its air is.
 
-    `tops` are the upper ends of shells. `guess` is the light per irradiance that falls
-    on a shell from all sides (on the ground, last: that leaves it, over its albedo),
-    with the cells of `cell` in the cosine of the sun's zenith angle; `diffuse` is the
-    part that has turned before, and `whence` the share of it from each cell of
-    directions. What is worked out with a poor guess is right, but noisy.
+    `tops` are the upper ends of shells; `forward` is the asymmetry of a medium where it
+    is above 0. `guess` is the light per irradiance that falls on a shell from all sides
+    (on the ground, last: that leaves it, over its albedo), with the cells of `cell` in
+    the cosine of the sun's zenith angle; `diffuse` is the part that has turned before,
+    and `whence` the share of it from each cell of directions. What is worked out with a
+    poor guess is right, but noisy.
     """
 
     tops: Float[Array, "shell"]
     extinction: Float[Array, "medium wl"]
     scattering: Float[Array, "medium wl"]
+    forward: Float[Array, "medium wl"]
     ground: Float[Array, "wl"]
     guess: Float[Array, "home cell wl"]
     diffuse: Float[Array, "home cell wl"]
@@ -62,12 +64,6 @@ def cell(cosine: Float[Array, "*n"]) -> Integer[Array, "*n"]:
     """Cells are the narrower the nearer the sun is to the horizon."""
     x = jnp.sign(cosine) * jnp.sqrt(jnp.abs(cosine))
     return jnp.clip(jnp.int32(0.5 * (x + 1.0) * SUNS), 0, SUNS - 1)
-
-
-def densities(scene: Scene, point: Point) -> Float[Array, "medium"]:
-    """How much there is of each medium, relative to its coefficients."""
-    found = [x.profile.density(point) for x in scene.media]
-    return jnp.stack(found) if found else jnp.zeros(0, point.altitude.dtype)
 
 
 def fly(scene: Scene, layers: Layers, start: Point, direction: Direction) -> Flight:

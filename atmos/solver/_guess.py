@@ -10,9 +10,9 @@ from ..geometry import Point
 from ..medium import Ball, Grid
 from ..quantity import Length, Wavelength
 from ..scene import Scene
-from ..transport import extinctions
+from ..transport import densities, extinctions
 from ._directions import views as cells
-from ._flight import brightness, densities, dot, fly, Layers, SUNS, to_sun
+from ._flight import brightness, dot, fly, Layers, SUNS, to_sun
 
 
 # Shells besides those of the media.
@@ -36,22 +36,23 @@ def prepare(scene: Scene, wavelength: Wavelength) -> Layers:
         else jnp.broadcast_to(x.scattering.evaluate(wavelength), wavelength.shape)
         for x in scene.media
     ]
+    forward = [
+        jnp.clip(x.phase.moments(2, wavelength)[1], 0.0, 0.999) for x in scene.media
+    ]
+    forward = [jnp.broadcast_to(x, wavelength.shape) for x in forward]
     none = jnp.zeros((0, *wavelength.shape), wavelength.dtype)
     dark = jnp.zeros((tops.shape[0] + 1, SUNS, *wavelength.shape), wavelength.dtype)
     layers = Layers(
         tops=tops,
         extinction=extinctions(scene, wavelength),
         scattering=jnp.stack(scattering) if scattering else none,
+        forward=jnp.stack(forward) if forward else none,
         ground=jnp.broadcast_to(scene.ground.evaluate(wavelength), wavelength.shape),
         guess=dark,
         diffuse=dark,
         whence=dark[:, :, None],
     )
-    forward = [
-        jnp.clip(x.phase.moments(2, wavelength)[1], 0.0, 0.999) for x in scene.media
-    ]
-    forward = [jnp.broadcast_to(x, wavelength.shape) for x in forward]
-    found = _guess(scene, layers, jnp.stack(forward) if forward else none)
+    found = _guess(scene, layers)
     return eqx.tree_at(lambda x: (x.guess, x.diffuse, x.whence), layers, found)
 
 
@@ -78,13 +79,11 @@ def _tops(scene: Scene) -> Float[Array, "shell"]:
 
 
 @eqx.filter_jit
-def _guess(
-    scene: Scene, layers: Layers, forward: Float[Array, "medium wl"]
-) -> tuple[Array, Array, Array]:
+def _guess(scene: Scene, layers: Layers) -> tuple[Array, Array, Array]:
     """The light of all orders, as if each medium sent the share `forward` of what it
     scatters straight on, and the rest everywhere alike."""
     thinner = lambda x: (x.extinction, x.scattering)
-    straight = forward * layers.scattering
+    straight = layers.forward * layers.scattering
     thin = layers.extinction - straight, layers.scattering - straight
     layers = eqx.tree_at(thinner, layers, thin)
     dtype = layers.tops.dtype

@@ -6,10 +6,10 @@ import numpy as np
 from jax.lax import stop_gradient
 from jaxtyping import Array, Float
 
-from ..geometry import AbstractPath, Point
+from ..geometry import AbstractPath
 from ..quantity import Length
 from ..scene import Scene
-from ..transport import gauss_legendre
+from ..transport import contract, densities, gauss_legendre
 
 
 # Where to cut a ray: fractions of its length in which depth is summed up coarsely.
@@ -59,14 +59,3 @@ def cut(
 
     kept = jax.lax.fori_loop(0, last - pieces, drop, index)[: pieces + 1]
     return edges[kept[:-1]], jnp.diff(edges[kept])
-
-
-def densities(scene: Scene, point: Point) -> Float[Array, "medium"]:
-    """Of every medium at a place."""
-    found = [x.profile.density(point) for x in scene.media]
-    return jnp.stack(found) if found else jnp.zeros(0, point.altitude.dtype)
-
-
-def contract(product: str, *terms: Array) -> Array:
-    """A sum of products, in full precision."""
-    return jnp.einsum(product, *terms, precision="highest")

@@ -10,7 +10,15 @@ from ..geometry import AbstractPath, Point
 from ..light import Sun
 from ..quantity import Direction, Length, Position, Wavelength
 from ..scene import Scene
-from ..transport import columns, cumulative, enter, extinctions, gauss_legendre
+from ..transport import (
+    columns,
+    contract,
+    cumulative,
+    densities,
+    enter,
+    extinctions,
+    gauss_legendre,
+)
 from ._base import AbstractSolver
 
 
@@ -76,20 +84,17 @@ class SingleScattering(AbstractSolver):
         slope = length[:, None] * (6.0 * u * (1.0 - u))[None]
         points = jax.vmap(jax.vmap(path.at))(places)
 
-        def profiles(point):
-            found = [x.profile.density(point) for x in scene.media]
-            return jnp.stack(found) if found else jnp.zeros(0, far.dtype)
-
-        steps = jax.vmap(jax.vmap(profiles))(points) * slope[:, :, None]
-        within = _sum(
+        found = jax.vmap(jax.vmap(lambda point: densities(scene, point)))(points)
+        steps = found * slope[:, :, None]
+        within = contract(
             "ij,pjm->pim", jnp.asarray(cumulative(self.nodes), far.dtype), steps
         )
-        whole = _sum("j,pjm->pm", w, steps)
+        whole = contract("j,pjm->pm", w, steps)
         before = jnp.cumsum(whole, 0) - whole
         passed = before[:, None, :] + within + jax.vmap(jax.vmap(to_light))(points)
-        arrives = jnp.exp(-_sum("pim,ml->pil", passed, extinction))
+        arrives = jnp.exp(-contract("pim,ml->pil", passed, extinction))
         steps = jnp.where(lit[:, None, None], steps * w[None, :, None], 0.0)
-        gathered = _sum("pim,pil->ml", steps, arrives)
+        gathered = contract("pim,pil->ml", steps, arrives)
         air = [
             x.scattering.evaluate(wavelength) * gathered[i] * irradiance
             for i, x in enumerate(scene.media)
@@ -99,7 +104,7 @@ class SingleScattering(AbstractSolver):
         foot = path.at(far)
         foot = Point(foot.position, jnp.zeros_like(far), foot.up)
         passed = jnp.sum(whole, 0) + to_light(foot)
-        arrives = jnp.exp(-_sum("m,ml->l", passed, extinction))
+        arrives = jnp.exp(-contract("m,ml->l", passed, extinction))
         rise = jnp.maximum(jnp.dot(foot.up, light.direction), 0.0)
         albedo = scene.ground.evaluate(wavelength)
         ground = albedo / math.pi * rise * arrives * irradiance
@@ -124,7 +129,7 @@ class SingleScattering(AbstractSolver):
 
         def depth(halvings):
             found = columns(scene, fixed, whole * jnp.exp2(-halvings), nodes=4)
-            depth = _sum("m,ml->l", jax.lax.stop_gradient(found), extinction)
+            depth = contract("m,ml->l", jax.lax.stop_gradient(found), extinction)
             return jnp.min(depth, initial=math.inf)
 
         def closer(_, bounds):
@@ -177,7 +182,3 @@ def _join(edges: Float[Array, "edge"], pieces: int) -> Float[Array, "cut"]:
 
     kept = jax.lax.fori_loop(0, max(last - pieces, 0), drop, places)
     return edges[kept[: pieces + 1]]
-
-
-def _sum(product: str, *terms: Array) -> Array:
-    return jnp.einsum(product, *terms, precision="highest")
