@@ -6,6 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from .medium import Ball, Grid
 from .quantity import Length, Wavelength
 from .scene import Scene
 from .transport import densities, extinctions, gauss_legendre
@@ -44,6 +45,16 @@ def mixture(scene: Scene, wavelength: Wavelength, moments: int) -> Mixture:
         lobes.append(jnp.broadcast_to(lobe, (moments, *wavelength.shape)))
     none = jnp.zeros((0, moments, *wavelength.shape), wavelength.dtype)
     return Mixture(extinctions(scene, wavelength), jnp.stack(lobes) if lobes else none)
+
+
+def check_layered(scene: Scene) -> None:
+    """Raises `ValueError` for a medium that does not depend on altitude alone."""
+    for i, x in enumerate(scene.media):
+        if isinstance(x.profile, (Ball, Grid)):
+            raise ValueError(
+                f"`scene.media[{i}].profile` must depend on altitude alone, for this "
+                f"solver; got {type(x.profile).__name__}."
+            )
 
 
 class Layers(eqx.Module):

@@ -8,7 +8,7 @@ import pytest
 
 from atmos.geometry import Flat, Spherical
 from atmos.light import Sun
-from atmos.medium import Medium, Uniform
+from atmos.medium import Ball, Medium, Uniform
 from atmos.phase import HenyeyGreenstein
 from atmos.scene import Scene
 from atmos.solver import Columns, SingleScattering, solve
@@ -238,3 +238,11 @@ def test_low_suns_in_a_round_world_are_refused():
     solve(sinking(84.9), SOLVER, NM)
     with pytest.raises(ValueError, match="lights.0.. must stand 5 degrees .* got 4"):
         solve(sinking(86.0), SOLVER, NM)
+
+
+def test_media_that_change_sideways_are_refused():
+    ball = Medium(Ball(np.array([0.0, 0.0, 1.0]), 1.0), 1.0)
+    layered = world(Flat(), 0.1, 1.0, 0.0, jnp.array(0.5), 0.0, 0.5)
+    scene = eqx.tree_at(lambda x: x.media, layered, (ball,))
+    with pytest.raises(ValueError, match="media.0..profile. must depend on altitude"):
+        solve(scene, SOLVER, NM)

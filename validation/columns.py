@@ -67,7 +67,12 @@ class Series(phase.AbstractPhaseFunction):
         return jnp.sum(terms)[None] / (4.0 * PI)
 
     def sample(self, key, wavelength):
-        raise NotImplementedError
+        versines = 0.5 * jnp.linspace(0.0, 2.0, 8193, dtype=self.known.dtype) ** 2
+        density = jax.vmap(lambda x: self.evaluate(x, wavelength)[0])(versines)
+        steps = 0.5 * (density[1:] + density[:-1]) * jnp.diff(versines)
+        upto = jnp.concatenate([jnp.zeros_like(steps[:1]), jnp.cumsum(steps)])
+        u = jax.random.uniform(key, dtype=upto.dtype)
+        return jnp.interp(u * upto[-1], upto, versines)
 
     def moments(self, count, wavelength):
         known = self.known[:count]

@@ -7,7 +7,6 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..geometry import Point
-from ..medium import Ball, Grid
 from ..quantity import Length, Wavelength
 from ..scene import Scene
 from ..transport import densities, extinctions
@@ -22,13 +21,7 @@ _ROUNDS, _LEAST = 4, 0.5
 
 
 def prepare(scene: Scene, wavelength: Wavelength) -> Layers:
-    """Raises `ValueError` for a medium that does not depend on altitude alone."""
-    for i, x in enumerate(scene.media):
-        if isinstance(x.profile, (Ball, Grid)):
-            raise ValueError(
-                f"`scene.media[{i}].profile` must depend on altitude alone to be "
-                f"traced; got {type(x.profile).__name__}."
-            )
+    """Cuts the air into shells, and guesses how bright they are."""
     tops = _tops(scene)
     scattering = [
         jnp.zeros_like(wavelength)

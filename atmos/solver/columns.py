@@ -8,7 +8,7 @@ from jaxtyping import Array, Bool, Float
 
 from ..geometry import Flat
 from ..light import Sun
-from ..optics import layers, mixture
+from ..optics import check_layered, layers, mixture
 from ..quantity import Angle, deg, Direction, Irradiance, Length, Position, Wavelength
 from ..scene import Scene
 from ..transport import columns, extinctions
@@ -44,9 +44,9 @@ class Columns(AbstractSolver):
     light, whose rays reach a column along their own curved way. A line of sight takes
     `nodes` places in each of `pieces` pieces.
 
-    Media are taken to be alike sideways, as they are straight above the origin. Raises
-    `ValueError` where there are more edges of media than layers, and in a round world
-    for lights less than 5 degrees above the horizon.
+    Raises `ValueError` where a medium does not depend on altitude alone, where media
+    have more edges than there are layers, and in a round world for lights less than 5
+    degrees above the horizon.
     """
 
     around: ClassVar[int] = 17
@@ -58,6 +58,7 @@ class Columns(AbstractSolver):
     single: SingleScattering = SingleScattering()
 
     def check(self, scene: Scene) -> None:
+        check_layered(scene)
         if isinstance(scene.geometry, Flat):
             return
         for i, light in enumerate(scene.lights):

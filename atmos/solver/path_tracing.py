@@ -7,6 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, Integer, PRNGKeyArray, Scalar
 
 from ..light import Sun
+from ..optics import check_layered
 from ..quantity import Direction, Number, Position, Radiance, Wavelength
 from ..scene import Scene
 from ..transport import enter
@@ -55,7 +56,7 @@ class PathTracing(AbstractSolver):
     the standard error is taken from how they differ. One more block changes nothing in
     those before: all is decided by `key`. Light that turned once comes from `single`;
     with None it is traced too. Suns are points. Media depend on altitude alone:
-    `prepare` raises `ValueError` otherwise.
+    `check` raises `ValueError` otherwise.
     """
 
     around: ClassVar[int] = 17
@@ -71,6 +72,9 @@ class PathTracing(AbstractSolver):
                 raise ValueError(
                     f"`{name}` must be at least {least}; got {getattr(self, name)}."
                 )
+
+    def check(self, scene: Scene) -> None:
+        check_layered(scene)
 
     def prepare(self, scene: Scene, wavelength: Wavelength) -> Layers:
         return prepare(scene, wavelength)
