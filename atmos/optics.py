@@ -16,25 +16,37 @@ class Mixture(eqx.Module):
     """What a metre of each medium does to light where its profile is 1.
 
     `scattering` is the scattering coefficient times the Legendre moments of the phase
-    function, so that media simply add. Both in m^-1.
+    function, and `polarised` that times its `polarisation_moments`, so that media
+    simply add; without degrees where polarisation is not asked for. All in m^-1.
     """
 
     extinction: Float[Array, "medium wl"]
     scattering: Float[Array, "medium l wl"]
+    polarised: Float[Array, "medium k 3 wl"]
 
     def truncated(self) -> "Mixture":
         """The same without the forward peak, which is taken as not scattered at all.
 
         Delta-M (Wiscombe 1977): of each medium the share of the last moment goes, and
-        that moment with it.
+        that moment with it. Light in the peak stays polarised as it was.
         """
         peak = self.scattering[:, -1]
         smooth = self.scattering[:, :-1] - peak[:, None]
-        return Mixture(self.extinction - peak, smooth)
+        # Of media that polarise: the others keep nothing that could be less.
+        polarises = jnp.any(self.polarised != 0.0, (1, 2, 3), keepdims=True)
+        degree = np.arange(self.polarised.shape[1])[:, None]
+        kept = jnp.asarray((degree >= 2) & np.array([True, True, False]), peak.dtype)
+        lost = jnp.where(polarises, peak[:, None, None], 0.0) * kept[None, :, :, None]
+        return Mixture(self.extinction - peak, smooth, self.polarised - lost)
 
 
-def mixture(scene: Scene, wavelength: Wavelength, moments: int) -> Mixture:
-    """The media of a scene with the first so many moments of their phase functions."""
+def mixture(
+    scene: Scene, wavelength: Wavelength, moments: int, stokes: int = 1
+) -> Mixture:
+    """The media of a scene with the first so many moments of their phase functions.
+
+    With those of polarisation, of one degree less, if `stokes` is 3.
+    """
     lobes = []
     for x in scene.media:
         if x.scattering is None:
@@ -44,7 +56,27 @@ def mixture(scene: Scene, wavelength: Wavelength, moments: int) -> Mixture:
             lobe = lobe * x.scattering.evaluate(wavelength)[None]
         lobes.append(jnp.broadcast_to(lobe, (moments, *wavelength.shape)))
     none = jnp.zeros((0, moments, *wavelength.shape), wavelength.dtype)
-    return Mixture(extinctions(scene, wavelength), jnp.stack(lobes) if lobes else none)
+    return Mixture(
+        extinctions(scene, wavelength),
+        jnp.stack(lobes) if lobes else none,
+        _polarised(scene, wavelength, moments - 1 if stokes == 3 else 0),
+    )
+
+
+def _polarised(
+    scene: Scene, wavelength: Wavelength, count: int
+) -> Float[Array, "medium k 3 wl"]:
+    """Scattering times the moments of polarisation, of as many degrees as any has."""
+    found = [jnp.zeros((0, 3, *wavelength.shape), wavelength.dtype)] * len(scene.media)
+    for i, x in enumerate(scene.media):
+        if x.scattering is not None and count > 0:
+            known = x.phase.polarisation_moments(count, wavelength)
+            known = known * x.scattering.evaluate(wavelength)[None, None]
+            found[i] = jnp.broadcast_to(known, (*known.shape[:2], *wavelength.shape))
+    most = max((len(x) for x in found), default=0)
+    pad = lambda x: jnp.pad(x, ((0, most - len(x)), (0, 0), (0, 0)))
+    none = jnp.zeros((0, most, 3, *wavelength.shape), wavelength.dtype)
+    return jnp.stack([pad(x) for x in found]) if found else none
 
 
 def check_layered(scene: Scene) -> None:

@@ -31,6 +31,33 @@ class AbstractPhaseFunction(eqx.Module):
         factor 2l + 1.
         """
 
+    def polarisation(self, versine: Versine, wavelength: Wavelength) -> PhaseValue:
+        """How much more scatters vibrating across the plane of scattering than in it.
+
+        Per steradian, of light that came without polarisation: -P12, or -F12, where
+        Q counts what vibrates in that plane. 0 for a function that knows no better.
+        """
+        return jnp.zeros_like(self.evaluate(versine, wavelength))
+
+    def polarisation_moments(
+        self, count: int, wavelength: Wavelength
+    ) -> Float[Array, "k 3 #wl"]:
+        """Moments of the rest of the scattering matrix, of degrees 0, 1, ... below k.
+
+        In columns alpha2, alpha3 and beta1: with Wigner's functions d^l of the angle of
+        scattering, as `moments` without the factor 2l + 1,
+
+            P22 + P33 = (alpha2 + alpha3) d_22,  P22 - P33 = (alpha2 - alpha3) d_2-2,
+            -P12 = beta1 d_02,
+
+        each summed over l with (2l + 1) / (4 pi): those of Hovenier and van der Mee
+        (1983), and Siewert's (1982) alpha, zeta and gamma. There are no more than
+        `count` degrees, and only as many as differ from 0: none by default, for what
+        scatters leaves without polarisation then.
+        """
+        del count
+        return jnp.zeros((0, 3, 1), wavelength.dtype)
+
     def terms(
         self, wavelength: Wavelength
     ) -> "tuple[tuple[AbstractPhaseFunction, Spectral], ...]":

@@ -1,3 +1,5 @@
+import math
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -19,7 +21,9 @@ class Rayleigh(AbstractPhaseFunction):
 
         3 / (16 pi) ((1 + 3 gamma) + (1 - gamma) cos^2) / (1 + 2 gamma),
 
-    with gamma = rho / (2 - rho) multiplied out.
+    with gamma = rho / (2 - rho) multiplied out. The scattering matrix is that of Hansen
+    and Travis (1974): a share 2 (1 - rho) / (2 + rho) scatters as a dipole, the rest
+    alike in all directions and without polarisation.
     """
 
     depolarisation: AbstractSpectrum = eqx.field(converter=as_spectrum, default=0.0)
@@ -50,9 +54,23 @@ class Rayleigh(AbstractPhaseFunction):
         moments = jnp.zeros((count, *rho.shape), rho.dtype).at[0].set(1.0)
         return moments.at[2:3].set(second) if count > 2 else moments
 
+    def polarisation(self, versine: Versine, wavelength: Wavelength) -> PhaseValue:
+        return 0.1875 / jnp.pi * self._pure(wavelength) * (versine * (2.0 - versine))
+
+    def polarisation_moments(
+        self, count: int, wavelength: Wavelength
+    ) -> Float[Array, "k 3 #wl"]:
+        second = jnp.array([0.6, 0.0, 0.1 * math.sqrt(6.0)], wavelength.dtype)
+        second = second[:, None] * self._pure(wavelength)[None]
+        return jnp.stack([jnp.zeros_like(second)] * 2 + [second])[:count]
+
+    def _pure(self, wavelength: Wavelength) -> Spectral:
+        """The share that scatters as a dipole."""
+        rho = self.depolarisation.evaluate(wavelength)
+        return 2.0 * (1.0 - rho) / (2.0 + rho)
+
     def terms(
         self, wavelength: Wavelength
     ) -> tuple[tuple[AbstractPhaseFunction, Spectral], ...]:
-        rho = self.depolarisation.evaluate(wavelength)
-        pure = 2.0 * (1.0 - rho) / (2.0 + rho)
-        return (Rayleigh(jnp.zeros_like(rho[0])), pure), (Isotropic(), 1.0 - pure)
+        pure = self._pure(wavelength)
+        return (Rayleigh(jnp.zeros_like(pure[0])), pure), (Isotropic(), 1.0 - pure)

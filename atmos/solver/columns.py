@@ -92,6 +92,7 @@ class Columns(AbstractSolver):
             slant[::-1],
             jnp.cos(zeniths),
             albedo,
+            total(mixed.polarised)[::-1],
         )
         turned = lambda x: jnp.swapaxes(x[::-1], 0, 1)
         return Field(

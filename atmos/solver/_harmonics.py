@@ -1,0 +1,98 @@
+"""Functions of direction in which scattering is diagonal.
+
+For radiance these are associated Legendre functions. Q and U of light that travels at
+an angle theta from the zenith turn with the vertical plane that they are counted from:
+for them they are Wigner's functions d^l_(n,m)(theta) with n = 2 and -2, the generalised
+spherical functions. Of a field that is alike to the left and the right of the sun,
+
+    I = sum T_lm P_lm cos(m phi),
+    Q = sum (E_lm R_lm + B_lm S_lm) cos(m phi),
+    U = sum (E_lm S_lm + B_lm R_lm) sin(m phi),
+
+with P of `harmonics`, R and S of `spin_harmonics` of cos theta, phi the azimuth from
+the sun's clockwise seen from above, and Q and U as in `atmos.polarisation`
+(Siewert 1982). Reversed directions give (-1)^(l + m) times P, R and -S. Scattering
+turns T, E and B of each l and m into
+
+    (alpha1 T + beta1 E, beta1 T + alpha2 E, alpha3 B).
+"""
+
+import functools as ft
+import math
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array
+
+
+@ft.cache
+def pairs(count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Degrees l below `count` and orders m up to l, by degree."""
+    return np.tril_indices(count)
+
+
+def harmonics(cosine: Array | np.ndarray, count: int) -> Any:
+    """Associated Legendre functions of degree and order below `count`: [..., l, m].
+
+    Normalised by ((l - m)! / (l + m)!)^(1/2), without the sign (-1)^m: Wigner's
+    d^l_(0,m). Of NumPy's arrays they are one of NumPy's.
+    """
+    xp = np if isinstance(cosine, np.ndarray) else jnp
+    x = cosine[..., None]
+    m = np.arange(count)
+    row_of = lambda values: np.asarray(values, x.dtype)[(None,) * (x.ndim - 1)]
+    sine = _sine(xp, x)
+    edge = xp.ones_like(x)
+    row = edge * row_of(m == 0)
+    before, rows = xp.zeros_like(row), [row]
+    for l in range(count - 1):
+        edge = edge * sine * row_of([math.sqrt((2 * l + 1) / (2 * l + 2))])
+        scale = np.sqrt(np.maximum((l + 1) ** 2 - m * m, 1.0))
+        ahead = row_of((2 * l + 1) / scale * (m <= l))
+        back = row_of(np.sqrt(np.maximum(l * l - m * m, 0.0)) / scale)
+        row, before = ahead * x * row - back * before + edge * row_of(m == l + 1), row
+        rows.append(row)
+    return xp.stack(rows, -2)
+
+
+def spin_harmonics(cosine: Array | np.ndarray, count: int) -> tuple[Any, Any]:
+    """R and S: half the sum and half the difference of d^l_(2,m) and d^l_(-2,m).
+
+    Of degree and order below `count`, each [..., l, m]; 0 below degree 2. R + S and
+    R - S of order 2 are d^l_22 and d^l_2-2 of an angle of scattering, and `harmonics`
+    of order 2 is d^l_02.
+    """
+    xp = np if isinstance(cosine, np.ndarray) else jnp
+    x = cosine[..., None]
+    sine = _sine(xp, x)
+    both = [_spin(xp, x, sine, n, count) for n in (2, -2)]
+    return 0.5 * (both[0] + both[1]), 0.5 * (both[0] - both[1])
+
+
+def _spin(xp: Any, x: Any, sine: Any, n: int, count: int) -> Any:
+    """Wigner's d^l_(n,m) of n = 2 or -2, by the three-term recurrence in l."""
+    m = np.arange(count)
+    row_of = lambda values: np.asarray(values, x.dtype)[(None,) * (x.ndim - 1)]
+    half = 0.5 + (0.25 * n) * x
+    edge = half * half
+    zero = edge * row_of(0.0 * m)
+    row = zero + math.sqrt(0.375) * sine * sine * row_of(m == 0)
+    row = row - (0.5 * n) * sine * half * row_of(m == 1) + edge * row_of(m == 2)
+    before, rows = zero, [zero, zero, row][:count]
+    for l in range(2, count - 1):
+        ratio = math.sqrt((2 * l + 2) * (2 * l + 1) / ((l + 3) * (l - 1)))
+        edge = edge * sine * row_of([0.5 * ratio])
+        scale = np.sqrt(np.maximum((l + 1) ** 2 - m * m, 1.0) * ((l + 1) ** 2 - 4))
+        inside = (2 * l + 1) / (l * scale) * (m <= l)
+        back = np.sqrt(np.maximum(l * l - m * m, 0.0) * (l * l - 4))
+        back = row_of((l + 1) / l * back / scale)
+        ahead = row_of(l * (l + 1) * inside) * x - row_of(n * m * inside)
+        row, before = ahead * row - back * before + edge * row_of(m == l + 1), row
+        rows.append(row)
+    return xp.stack(rows, -2)
+
+
+def _sine(xp: Any, x: Any) -> Any:
+    inside = x * x < 1.0
+    return xp.where(inside, xp.sqrt(xp.where(inside, 1.0 - x * x, 1.0)), 0.0)
