@@ -25,6 +25,7 @@ Fraction: TypeAlias = Float[Array, "wl"]  # 1
 Depth: TypeAlias = Float[Array, "wl"]  # 1, optical depth
 Irradiance: TypeAlias = Float[Array, "wl"]  # W m^-2 nm^-1
 Radiance: TypeAlias = Float[Array, "wl"]  # W m^-2 sr^-1 nm^-1
+Stokes: TypeAlias = Float[Array, "3 wl"]  # I, Q and U, W m^-2 sr^-1 nm^-1
 
 m = 1.0
 km = 1000.0 * m

@@ -18,6 +18,7 @@ ROOT = pathlib.Path(atmos.__file__).parent
 ROOMS = [
     "data",
     "quantity",
+    "polarisation",
     "reference",
     "spectrum",
     "phase",

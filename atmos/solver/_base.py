@@ -11,12 +11,14 @@ from jaxtyping import Array, ArrayLike, Float, PyTree
 
 from ..light import Sun
 from ..phase import Isotropic
+from ..polarisation import vibration
 from ..quantity import (
     as_float,
     Direction,
     Number,
     Position,
     Radiance,
+    Stokes,
     versine,
     Wavelength,
 )
@@ -27,10 +29,12 @@ from ..sky import AbstractSky, fine_enough, Grid, Panorama, Resolution
 class AbstractSolver(eqx.Module):
     """A way to find the light in a scene.
 
-    By day, what it finds varies little between `around` azimuths on half a circle.
+    By day, what it finds varies little between `around` azimuths on half a circle. It
+    is radiance alone where `stokes` is 1, and I, Q and U where that is 3.
     """
 
     around: ClassVar[int]
+    stokes: eqx.AbstractVar[int]
 
     def check(self, scene: Scene) -> None:
         """Raises `ValueError` for a scene that the method does not hold for."""
@@ -52,9 +56,15 @@ class AbstractSolver(eqx.Module):
         """What one sees by one light, in parts.
 
         A part for each medium that scatters, which is yet to be multiplied by the
-        medium's phase function towards the light, and a last one that is radiance as it
-        stands.
+        medium's phase function towards the light, and then radiance as it stands, or
+        I, Q and U as they stand.
         """
+
+
+def check_stokes(stokes: int) -> None:
+    """Raises `ValueError` for a number of Stokes parameters that is not 1 or 3."""
+    if stokes not in (1, 3):
+        raise ValueError(f"`stokes` must be 1 or 3; got {stokes}.")
 
 
 class SolvedSky(AbstractSky):
@@ -70,9 +80,35 @@ class SolvedSky(AbstractSky):
         for light in self.scene.lights:
             parts = self._parts(light, position, direction)
             turned = versine(direction, light.direction)
-            for medium, part in zip(self.scene.scattering_media, parts, strict=False):
+            media = self.scene.scattering_media
+            for medium, part in zip(media, parts, strict=False):
                 total += medium.phase.evaluate(turned, self.wavelength) * part
-            total += parts[-1]
+            total += parts[len(media)]
+        return total
+
+    def stokes(self, position: Position, direction: Direction) -> Stokes:
+        """I, Q and U of what one sees, in the frame of `atmos.polarisation`.
+
+        Q counts what vibrates level, minus what vibrates in the vertical plane of the
+        view. Raises `ValueError` unless the sky was solved with `stokes` 3.
+        """
+        if self.solver.stokes != 3:
+            raise ValueError(
+                "`sky` must be solved with `stokes` 3 to be polarised; got "
+                f"{self.solver.stokes}."
+            )
+        up = self.scene.geometry.locate(position).up
+        total = jnp.zeros((3, *self.wavelength.shape), self.wavelength.dtype)
+        for light in self.scene.lights:
+            parts = self._parts(light, position, direction)
+            turned = versine(direction, light.direction)
+            q, u = vibration(up, direction, light.direction)
+            media = self.scene.scattering_media
+            for medium, part in zip(media, parts, strict=False):
+                across = medium.phase.polarisation(turned, self.wavelength) * part
+                i = medium.phase.evaluate(turned, self.wavelength) * part
+                total += jnp.stack([i, q * across, u * across])
+            total += parts[len(media) :]
         return total
 
     def panorama(self, position: Position) -> Panorama:

@@ -13,7 +13,8 @@ from ..optics import Mixture
 from ..quantity import Depth, Direction, Position, Wavelength
 from ..scene import Scene
 from ..transport import contract, cumulative, densities, enter, gauss_legendre
-from ._ordinates import harmonics, pairs
+from ._harmonics import harmonics, pairs
+from ._polarised import scattered
 from ._sight import cut
 from ._suns import AbstractSuns, zenith_angle
 
@@ -22,7 +23,8 @@ class Field(eqx.Module):
     """The moments of diffuse light over altitude, from the ground up, and suns.
 
     Of a light of irradiance 1; `moments` as of `_ordinates.Diffuse`. `mixture` are the
-    media without their forward peaks, which the light does not notice.
+    media without their forward peaks, which the light does not notice. With `stokes` 3
+    it is I, Q and U that one sees.
     """
 
     mixture: Mixture
@@ -31,6 +33,7 @@ class Field(eqx.Module):
     moments: Float[Array, "sun level pair wl"]
     up: Float[Array, "sun level wl"]
     down: Float[Array, "sun level wl"]
+    stokes: int = eqx.field(static=True, default=1)
 
     def _look(self, table: Array, light: Sun, point: Point) -> Array:
         """A table at a place, by straight lines in altitude."""
@@ -52,18 +55,25 @@ class Field(eqx.Module):
     def source(
         self,
         scattering: Float[Array, "l wl"],
+        polarised: Float[Array, "k 3 wl"],
         point: Point,
         light: Sun,
         view: Direction,
-    ) -> Float[Array, "wl"]:
+    ) -> Float[Array, "stokes wl"]:
         """What a metre adds to the light that arrives from direction `view`."""
         count = scattering.shape[0]
         l, m = pairs(count)
-        turn = harmonics(-jnp.dot(point.up, view), count)[l, m]
+        cosine = -jnp.dot(point.up, view)
+        turn = harmonics(cosine, count)[l, m]
         turn = turn * _cosines(point.up, view, light.direction, count)[m]
         turn = turn * jnp.asarray(l + 0.5, turn.dtype)
         moments = self._look(self.moments, light, point)
-        return jnp.sum(turn[:, None] * scattering[l] * moments, 0)
+        radiance, rest = moments[: len(l)], moments[len(l) :]
+        seen = jnp.sum(turn[:, None] * scattering[l] * radiance, 0)[None]
+        if self.stokes == 1:
+            return seen
+        more = scattered(polarised, radiance, rest, point.up, view, light.direction)
+        return jnp.pad(seen, ((0, 2), (0, 0))) + more
 
     def gather(
         self,
@@ -75,8 +85,11 @@ class Field(eqx.Module):
         *,
         pieces: int,
         nodes: int,
-    ) -> Float[Array, "wl"]:
-        """Light of more than one turn from along a line of sight, and from its end."""
+    ) -> Float[Array, "stokes wl"]:
+        """Light of more than one turn from along a line of sight, and from its end.
+
+        Its vertical plane is the same everywhere, so that Q and U simply add.
+        """
         path, far, grounded = enter(scene, position, direction)
         extinction = self.mixture.extinction
         begin, length = cut(scene, path, far, extinction, pieces)
@@ -89,8 +102,9 @@ class Field(eqx.Module):
             density = jax.vmap(lambda x: densities(scene, x))(points)
             lost = length * contract("jm,ml->jl", density, extinction)
             scattering = contract("jm,mkl->jkl", density, self.mixture.scattering)
-            shine = lambda s, x: self.source(s, x, light, direction)
-            source = length * jax.vmap(shine)(scattering, points)
+            polarised = contract("jm,mkpl->jkpl", density, self.mixture.polarised)
+            shine = lambda s, p, x: self.source(s, p, x, light, direction)
+            source = length * jax.vmap(shine)(scattering, polarised, points)
             depth, within = (
                 contract("j,jl->l", w, lost),
                 contract("ij,jl->il", inner, lost),
@@ -101,16 +115,16 @@ class Field(eqx.Module):
             empty = even <= 0.0
             whole = -jnp.expm1(-depth) / jnp.where(empty, 1.0, even)
             whole = jnp.where(empty, 1.0, whole)
-            seen = jnp.exp(-passed) * whole * jnp.sum(share * source, 0)
-            return passed + depth, seen
+            seen = jnp.sum(share[:, None] * source, 0)
+            return passed + depth, (jnp.exp(-passed) * whole)[None] * seen
 
         passed, seen = jax.lax.scan(piece, jnp.zeros_like(wavelength), (begin, length))
         foot = path.at(far)
         foot = Point(foot.position, jnp.zeros_like(far), foot.up)
         _, down = self.fluxes(light, foot)
         ground = scene.ground.evaluate(wavelength) / math.pi * down * jnp.exp(-passed)
-        total = jnp.sum(seen, 0) + jnp.where(grounded, ground, 0.0)
-        return total * light.irradiance.evaluate(wavelength)
+        total = jnp.sum(seen, 0).at[0].add(jnp.where(grounded, ground, 0.0))
+        return total * light.irradiance.evaluate(wavelength)[None]
 
 
 def _cosines(

@@ -63,7 +63,9 @@ def solve_column(
     matrix = [scattering, *(polarised[:, :, i] for i in range(3))]
     solve = lambda made, known: _solve(made, depth, known, slant, cosine, albedo)
     # Orders of azimuth that polarisation has no part in are solved without it.
-    parts = [solve(basis(streams // 2, 0, k, streams), scattering)] if k < streams else []
+    parts = (
+        [solve(basis(streams // 2, 0, k, streams), scattering)] if k < streams else []
+    )
     if k:
         made = basis(streams // 2, k, 0, k)
         parts.insert(0, solve(made, jnp.concatenate(matrix, 1)))

@@ -12,7 +12,7 @@ from ..optics import check_layered, layers, mixture
 from ..quantity import Angle, deg, Direction, Irradiance, Length, Position, Wavelength
 from ..scene import Scene
 from ..transport import columns, extinctions
-from ._base import AbstractSolver
+from ._base import AbstractSolver, check_stokes
 from ._diffuse import Field
 from ._ordinates import solve_column
 from ._suns import FlatSuns, RoundSuns
@@ -44,9 +44,12 @@ class Columns(AbstractSolver):
     light, whose rays reach a column along their own curved way. A line of sight takes
     `nodes` places in each of `pieces` pieces.
 
+    With `stokes` 3 the light is polarised, which changes its radiance too.
+
     Raises `ValueError` where a medium does not depend on altitude alone, where media
-    have more edges than there are layers, and in a round world for lights less than 5
-    degrees above the horizon.
+    have more edges than there are layers, in a round world for lights less than 5
+    degrees above the horizon, for other `stokes` than 1 and 3, and for 3 with fewer
+    than 4 streams.
     """
 
     around: ClassVar[int] = 17
@@ -56,6 +59,14 @@ class Columns(AbstractSolver):
     pieces: int = eqx.field(static=True, default=12)
     nodes: int = eqx.field(static=True, default=3)
     single: SingleScattering = SingleScattering()
+    stokes: int = eqx.field(static=True, default=1)
+
+    def __check_init__(self):
+        check_stokes(self.stokes)
+        if self.stokes == 3 and self.streams < 4:
+            raise ValueError(
+                f"`streams` must be at least 4 where `stokes` is 3; got {self.streams}."
+            )
 
     def check(self, scene: Scene) -> None:
         check_layered(scene)
@@ -71,7 +82,7 @@ class Columns(AbstractSolver):
                 )
 
     def prepare(self, scene: Scene, wavelength: Wavelength) -> Field:
-        mixed = mixture(scene, wavelength, self.streams + 1).truncated()
+        mixed = mixture(scene, wavelength, self.streams + 1, self.stokes).truncated()
         cut = layers(scene, mixed.extinction, self.layers)
         lights = jnp.array([x.zenith for x in scene.lights], wavelength.dtype)
         last = 0.5 * jnp.pi + scene.geometry.dip(scene.top, jnp.zeros_like(scene.top))
@@ -102,6 +113,7 @@ class Columns(AbstractSolver):
             turned(light.moments),
             turned(light.up),
             turned(light.down),
+            self.stokes,
         )
 
     def scattered(
@@ -126,7 +138,7 @@ class Columns(AbstractSolver):
             pieces=self.pieces,
             nodes=self.nodes,
         )
-        return once.at[-1].add(more)
+        return jnp.concatenate([once[:-1], once[-1:] + more[:1], more[1:]])
 
     def fluxes(
         self,

@@ -10,7 +10,7 @@ from ..light import Sun
 from ..optics import check_layered
 from ..quantity import Direction, Number, Position, Radiance, Wavelength
 from ..scene import Scene
-from ..transport import enter
+from ..transport import enter, extinctions
 from ._base import AbstractSolver, SolvedSky
 from ._collision import Task
 from ._flight import Layers
@@ -60,6 +60,7 @@ class PathTracing(AbstractSolver):
     """
 
     around: ClassVar[int] = 17
+    stokes: ClassVar[int] = 1
     key: PRNGKeyArray = eqx.field(default_factory=lambda: jax.random.key(0))
     blocks: int = eqx.field(static=True, default=1)
     walks: int = eqx.field(static=True, default=256)
@@ -94,8 +95,9 @@ class PathTracing(AbstractSolver):
             media = len(scene.scattering_media)
             parts = jnp.zeros((media + 1, *wavelength.shape), wavelength.dtype)
         else:
-            parts = self.single.scattered(
-                None, scene, light, wavelength, position, direction
+            extinction = extinctions(scene, wavelength)
+            parts = self.single.march(
+                scene, extinction, light, wavelength, position, direction
             )
         return parts.at[-1].add(tally.mean[0])
 

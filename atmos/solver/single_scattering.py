@@ -19,7 +19,7 @@ from ..transport import (
     extinctions,
     gauss_legendre,
 )
-from ._base import AbstractSolver
+from ._base import AbstractSolver, check_stokes
 
 
 # Where the clearest light has met these optical depths a ray is cut, as light changes
@@ -34,13 +34,18 @@ class SingleScattering(AbstractSolver):
     of media, and where the sun's rays have grazed the planet or such an edge. Each
     piece takes `nodes` places by Gauss and Legendre, and so does each piece of the way
     from there to the sun with `light_nodes`. Where there are more than `pieces`, the
-    shortest are joined.
+    shortest are joined. With `stokes` 3 the light is polarised; its radiance is the
+    same. Raises `ValueError` for other `stokes` than 1 and 3.
     """
 
     around: ClassVar[int] = 9
     nodes: int = eqx.field(static=True, default=10)
     light_nodes: int = eqx.field(static=True, default=8)
     pieces: int = eqx.field(static=True, default=28)
+    stokes: int = eqx.field(static=True, default=1)
+
+    def __check_init__(self):
+        check_stokes(self.stokes)
 
     def prepare(self, scene: Scene, wavelength: Wavelength) -> None:
         return None
@@ -56,7 +61,8 @@ class SingleScattering(AbstractSolver):
     ) -> Float[Array, "part wl"]:
         del prepared
         extinction = extinctions(scene, wavelength)
-        return self.march(scene, extinction, light, wavelength, position, direction)
+        parts = self.march(scene, extinction, light, wavelength, position, direction)
+        return jnp.pad(parts, ((0, self.stokes - 1), (0, 0)))
 
     def march(
         self,
