@@ -9,6 +9,7 @@ from . import (
     medium as medium,
     particle as particle,
     phase as phase,
+    polarisation as polarisation,
     scenefile as scenefile,
     sky as sky,
     solver as solver,
@@ -17,6 +18,6 @@ from . import (
 )
 from .disk import render_disks as render_disks
 from .quantity import deg as deg, km as km, m as m, nm as nm
-from .render import render as render
+from .render import render as render, render_stokes as render_stokes
 from .scene import earth as earth, mars as mars, Scene as Scene
 from .solver import solve as solve

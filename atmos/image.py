@@ -27,9 +27,14 @@ FilePath = str | os.PathLike[str]
 
 _OURS = """adoptedNeutral channels chromaticities chunkCount compression dataWindow
 displayWindow emissiveUnits envmap EV lineOrder luminanceWeights name negativeValues
-pixelAspectRatio pixelCentres screenWindowCenter screenWindowWidth spectralLayoutVersion
-spectralUnits tiles type units version whiteLuminance""".split()
+pixelAspectRatio pixelCentres polarisationFrame polarisationHandedness
+screenWindowCenter screenWindowWidth spectralLayoutVersion spectralUnits tiles type
+units version whiteLuminance""".split()
 _LARGEST = {np.float16: 65504.0, np.float32: 3.4028234663852886e38}
+_FRAME = {
+    "polarisationFrame": "Q, S1: level minus upright; U, S2: rising to the right minus "
+    "falling, as the observer sees it; upright is the vertical plane of the view",
+}
 
 
 class Picture(NamedTuple):
@@ -43,10 +48,13 @@ class Picture(NamedTuple):
         return np.stack([self.channels[name] for name in names], -1)
 
     def spectrum(
-        self,
+        self, stokes: int = 0
     ) -> tuple[Float[np.ndarray, "wl"], Float[np.ndarray, "height width wl"]]:
-        """The wavelengths in nm, and the radiance in W m^-2 sr^-1 nm^-1."""
-        spelt = re.compile(r"S0\.(\d+(?:,\d+)?)nm")
+        """The wavelengths in nm, and the radiance in W m^-2 sr^-1 nm^-1.
+
+        With `stokes` 1 or 2 Q or U in its place, if the file has them.
+        """
+        spelt = re.compile(rf"S{stokes}\.(\d+(?:,\d+)?)nm")
         found = [(spelt.fullmatch(name), name) for name in self.channels]
         bands = sorted(
             (float(match[1].replace(",", ".")), name) for match, name in found if match
@@ -60,6 +68,7 @@ def write_exr(
     image: Float[Array | np.ndarray, "height width 3"],
     space: AbstractColourSpace,
     *,
+    stokes: Float[Array | np.ndarray, "2 height width 3"] | None = None,
     half: bool = False,
     latlong: bool = False,
     attributes: Mapping[str, Attribute] | None = None,
@@ -68,8 +77,10 @@ def write_exr(
 
     The channels are R, G, B in CIE XYZ too: the chromaticities in the header say what
     they are. `whiteLuminance` is the luminance of (1, 1, 1) in cd m^-2, and
-    `luminanceWeights` are those of (1, 0, 0), (0, 1, 0), (0, 0, 1). `attributes` come
-    on top; numbers are kept in single precision.
+    `luminanceWeights` are those of (1, 0, 0), (0, 1, 0), (0, 0, 1). `stokes` are Q and
+    U in the same colour space, for layers of these names (Q.R and so on): through a
+    polariser at an angle psi one sees (RGB + Q cos 2 psi + U sin 2 psi) / 2.
+    `attributes` come on top; numbers are kept in single precision.
 
     Raises `ValueError` for values that are not finite, that 16 or 32 bits cannot hold,
     or that no light has (below 0, but for colours outside the gamut of an RGB space:
@@ -80,6 +91,11 @@ def write_exr(
     pixels = np.asarray(image)
     channels = _channels("image", pixels, ["R", "G", "B"], half, space.signed)
     header = _colours(space, pixels) | _projection(latlong) | _extra(attributes)
+    if stokes is not None:
+        for layer, plane in zip("QU", np.asarray(stokes), strict=True):
+            names = [f"{layer}.{x}" for x in "RGB"]
+            channels |= _channels("stokes", plane, names, half, True)
+        header |= _FRAME
     _write(path, header, channels)
 
 
@@ -88,6 +104,7 @@ def write_spectral_exr(
     radiance: Float[Array | np.ndarray, "height width wl"],
     wavelength: Float[Array | np.ndarray, "wl"],
     *,
+    stokes: Float[Array | np.ndarray, "2 height width wl"] | None = None,
     half: bool = False,
     latlong: bool = False,
     attributes: Mapping[str, Attribute] | None = None,
@@ -96,8 +113,9 @@ def write_spectral_exr(
 
     The layout is that of Fichet, Pacanowski and Wilkie 2021 ("An OpenEXR layout for
     spectral images", JCGT 10(3)). Where the wavelengths cover what the eye sees, there
-    is a preview in linear Rec.709 too, with the header of `write_exr`. Errors and
-    warnings are those of `write_exr`; `wavelength` has to rise.
+    is a preview in linear Rec.709 too, with the header of `write_exr`. `stokes` are Q
+    and U, for channels S1 and S2; S3 is written too, as the layout wants it, and is 0.
+    Errors and warnings are those of `write_exr`; `wavelength` has to rise.
     """
     pixels, bands = np.asarray(radiance), np.asarray(wavelength, float)
     names = [f"S0.{f'{at:.6f}'.replace('.', ',')}nm" for at in bands]
@@ -105,12 +123,19 @@ def write_spectral_exr(
     if not rising or np.any(bands <= 0.0) or len(set(names)) < len(names):
         raise ValueError(f"`wavelength` must be positive and rise; got {bands} nm.")
     channels = _channels("radiance", pixels, names, half, False)
+    if stokes is not None:
+        q, u = np.asarray(stokes)
+        for i, plane in enumerate((q, u, np.zeros_like(q)), 1):
+            numbered = [f"S{i}{x[2:]}" for x in names]
+            channels |= _channels("stokes", plane, numbered, half, True)
     header: dict[str, Any] = {
         "spectralLayoutVersion": "1.0",
         "emissiveUnits": "W.m^-2.sr^-1",
         "spectralUnits": "W m^-2 sr^-1 nm^-1",
         "EV": 0.0,
     }
+    if stokes is not None:
+        header |= _FRAME | {"polarisationHandedness": "right"}
     if len(bands) > 1 and has_colour(bands):
         weights = np.asarray(REC709.from_xyz(response(jnp.asarray(bands, np.float32))))
         preview = pixels @ weights.astype(pixels.dtype)

@@ -32,6 +32,32 @@ def render(
     then which share is done. Raises `ValueError` unless the camera stands straight
     above the origin.
     """
+    return _picture(sky, camera, response, progress, Panorama.radiance)
+
+
+def render_stokes(
+    sky: AbstractSky,
+    camera: AbstractCamera,
+    response: Response | None = None,
+    *,
+    progress: Callable[[float], None] = lambda done: None,
+) -> Float[Array, "3 height width channel"]:
+    """The same for polarised light: I as of `render`, and Q and U.
+
+    In the frame of `atmos.polarisation`: Q counts what vibrates level, whichever way
+    the camera is turned. Raises `ValueError` for a sky without polarisation, too.
+    """
+    picture = _picture(sky, camera, response, progress, Panorama.stokes)
+    return jnp.moveaxis(picture, 2, 0)
+
+
+def _picture(
+    sky: AbstractSky,
+    camera: AbstractCamera,
+    response: Response | None,
+    progress: Callable[[float], None],
+    look: Callable[..., Array],
+) -> Float[Array, "height width *stokes channel"]:
     dtype = sky.wavelength.dtype
     camera = jax.tree.map(lambda x: x.astype(dtype), camera)
     response = None if response is None else response.astype(dtype)
@@ -49,11 +75,13 @@ def render(
     for first in range(0, camera.height, rows):
         part = slice(first, first + rows)
         around = azimuth[part] if azimuth.shape[0] > 1 else azimuth
-        parts.append(_stretch(panorama, zenith[part], around, response))
+        parts.append(_stretch(panorama, zenith[part], around, response, look))
         progress(min(1.0, (first + rows) / camera.height))
     image = parts[0] if len(parts) == 1 else jnp.concatenate(parts)
     sees = camera.sees()
-    return image if sees.size == 1 else jnp.where(sees[..., None], image, 0.0)
+    if sees.size == 1:
+        return image
+    return jnp.where(jnp.expand_dims(sees, tuple(range(2, image.ndim))), image, 0.0)
 
 
 @eqx.filter_jit
@@ -72,9 +100,10 @@ def _stretch(
     zenith: Float[Array, "height #width"],
     azimuth: Float[Array, "#height width"],
     response: Response | None,
-) -> Float[Array, "height width channel"]:
+    look: Callable[..., Array],
+) -> Float[Array, "height width *stokes channel"]:
     def row(zenith, azimuth):
-        radiance = panorama.radiance(zenith[None], azimuth[None])[0]
+        radiance = look(panorama, zenith[None], azimuth[None])[0]
         if response is None:
             return radiance
         return jnp.matmul(radiance, response, precision="highest")
@@ -83,6 +112,5 @@ def _stretch(
     most = max(1, _BLOCK // width)
     together = max(x for x in range(1, min(most, height) + 1) if height % x == 0)
     if azimuth.shape[0] > 1:
-        look = lambda x: row(*x)
-        return jax.lax.map(look, (zenith, azimuth), batch_size=together)
+        return jax.lax.map(lambda x: row(*x), (zenith, azimuth), batch_size=together)
     return jax.lax.map(lambda x: row(x, azimuth[0]), zenith, batch_size=together)

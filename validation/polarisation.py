@@ -65,9 +65,7 @@ def table(rows):
     axes = [sorted({float(x[key]) for x in rows}) for key in KEYS]
     known = np.full((2, *(len(x) for x in axes), 3), np.nan)
     for x in rows:
-        at = [
-            axis.index(float(x[key])) for key, axis in zip(KEYS, axes, strict=True)
-        ]
+        at = [axis.index(float(x[key])) for key, axis in zip(KEYS, axes, strict=True)]
         known[(int(x["dir"] == "DN"), *at)] = [float(x[key]) for key in "IQU"]
     return axes, known
 

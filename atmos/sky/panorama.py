@@ -8,9 +8,11 @@ from collections.abc import Callable
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float, Int
 
 from ..phase import AbstractPhaseFunction
+from ..polarisation import vibration_at
 from ..quantity import Angle, deg, km, Wavelength
 from ..transport import contract
 
@@ -128,7 +130,7 @@ class Panorama(eqx.Module):
 
     For each light, `table` holds the radiance on a grid of directions, in parts: one
     for each phase function, which is put on only when looked up and so stays exact, and
-    a last one that has none.
+    a last one that has none; or three, I, Q and U, where light is polarised.
     """
 
     grid: Grid
@@ -152,27 +154,71 @@ class Panorama(eqx.Module):
         """
         shape = jnp.broadcast_shapes(zenith.shape, azimuth.shape)
         total = jnp.zeros((*shape, self.table.shape[-1]), self.table.dtype)
-        in_rows = zenith.shape[1] == 1 and azimuth.shape[0] == 1
-        look = self._rows if in_rows else self._pixels
+        look = self._look_up(zenith, azimuth)
+        table = self.table[..., : len(self.phases) + 1, :]
         for i in range(self.table.shape[0]):
             relative = azimuth - self.light_azimuth[i]
             turned = versine_between(zenith, self.light_zenith[i], relative)
-            total += look(self.table[i], zenith, relative, self._weights(turned))
+            total += look(table[i], zenith, relative, self._weights(turned))
         # Between a lit place and a dark one a cubic may swing below nothing.
-        least = jnp.where(jnp.min(self.table, initial=0.0) < 0.0, -math.inf, 0.0)
+        least = jnp.where(jnp.min(table, initial=0.0) < 0.0, -math.inf, 0.0)
         visible = (zenith >= self.grid.first)[..., None]
         return jnp.where(visible, jnp.maximum(total, least), 0.0)
 
-    def _weights(self, turned):
-        """What each part of the table is to be multiplied by, pixel by pixel."""
-        look = lambda p: jax.vmap(jax.vmap(lambda v: p.evaluate(v, self.wavelength)))
-        return [
-            *(look(x)(turned) for x in self.phases),
-            jnp.ones_like(turned)[..., None],
-        ]
+    def stokes(
+        self,
+        zenith: Float[Array, "#height #width"],
+        azimuth: Float[Array, "#height #width"],
+    ) -> Float[Array, "height width 3 channel"]:
+        """I, Q and U from each direction, in the frame of `atmos.polarisation`.
 
-    def _rings(self, table, zenith):
-        """The table at other zenith angles, with one more azimuth at each end."""
+        I is that of `radiance`. Raises `ValueError` for a sky without polarisation.
+        """
+        if not self._polarised:
+            raise ValueError("`sky` must be solved with `stokes` 3 to be polarised.")
+        radiance = self.radiance(zenith, azimuth)
+        q, u = jnp.zeros_like(radiance), jnp.zeros_like(radiance)
+        look, count = self._look_up(zenith, azimuth), len(self.phases)
+        phases, rest = self.table[..., :count, :], self.table[..., count:, :]
+        for i in range(self.table.shape[0]):
+            relative = azimuth - self.light_azimuth[i]
+            turned = versine_between(zenith, self.light_zenith[i], relative)
+            level, slanted = vibration_at(zenith, self.light_zenith[i], relative)
+            *across, one = self._weights(turned, polarisation=True)
+            # To the left of the light U has the other sign.
+            side = jnp.where(jnp.sin(relative) < 0.0, -one[..., 0], one[..., 0])
+            part = lambda k, i=i: jnp.concatenate(
+                [phases[i], rest[i, ..., k, None, :]], -2
+            )
+            put = lambda x, last, w=across: [*(x[..., None] * y for y in w), last]
+            q += look(part(1), zenith, relative, put(level, one))
+            u += look(part(2), zenith, relative, put(slanted, side[..., None]), odd=1)
+        visible = (zenith >= self.grid.first)[..., None]
+        q, u = (jnp.where(visible, x, 0.0) for x in (q, u))
+        return jnp.stack([radiance, q, u], -2)
+
+    @property
+    def _polarised(self) -> bool:
+        return self.table.shape[-2] == len(self.phases) + 3
+
+    def _look_up(self, zenith, azimuth):
+        in_rows = zenith.shape[1] == 1 and azimuth.shape[0] == 1
+        return self._rows if in_rows else self._pixels
+
+    def _weights(self, turned, polarisation=False):
+        """What each part of the table is to be multiplied by, pixel by pixel."""
+
+        def look(phase):
+            value = phase.polarisation if polarisation else phase.evaluate
+            return jax.vmap(jax.vmap(lambda v: value(v, self.wavelength)))(turned)
+
+        return [*(look(x) for x in self.phases), jnp.ones_like(turned)[..., None]]
+
+    def _rings(self, table, zenith, odd=0):
+        """The table at other zenith angles, with one more azimuth at each end.
+
+        The last so many parts are `odd`: they change their sign beyond an end.
+        """
         grid, size = self.grid, self.grid.resolution
         grounded = zenith > grid.horizon
         low = jnp.where(grounded, float(size.above), 0.0)
@@ -180,7 +226,12 @@ class Panorama(eqx.Module):
         place, weights = _cubic(grid.ring(zenith), low, low + count - 1.0)
         mixing = _matrix(place, weights, size.above + size.below)
         rings = contract("hr,rapl->hapl", mixing, table)
-        return jnp.pad(rings, ((0, 0), (1, 1), (0, 0), (0, 0)), mode="reflect")
+        rings = jnp.pad(rings, ((0, 0), (1, 1), (0, 0), (0, 0)), mode="reflect")
+        if not odd:
+            return rings
+        mirror = np.ones((*rings.shape[1:3], 1))
+        mirror[[0, -1], -odd:] = -1.0
+        return rings * jnp.asarray(mirror, rings.dtype)[None]
 
     def _mixing(self, relative):
         """What each azimuth of such rings counts at other azimuths."""
@@ -188,8 +239,8 @@ class Panorama(eqx.Module):
         place = self.grid.side(relative) + 1.0
         return _matrix(*_cubic(place, 0.0, count - 1.0), count)
 
-    def _rows(self, table, zenith, relative, weights):
-        rings, mixing = self._rings(table, zenith[:, 0]), self._mixing(relative[0])
+    def _rows(self, table, zenith, relative, weights, odd=0):
+        rings, mixing = self._rings(table, zenith[:, 0], odd), self._mixing(relative[0])
         # Weights alike at all wavelengths go into the matrix that mixes azimuths.
         even = [i for i, x in enumerate(weights) if x.shape[-1] == 1]
         factor = jnp.concatenate([weights[i] for i in even], -1)
@@ -205,7 +256,8 @@ class Panorama(eqx.Module):
             total += weights[i] * contract("wa,hal->hwl", mixing, rings[:, :, i])
         return total
 
-    def _pixels(self, table, zenith, relative, weights):
+    def _pixels(self, table, zenith, relative, weights, odd=0):
+        del odd
         grid, size = self.grid, self.grid.resolution
         ring, side = jnp.broadcast_arrays(grid.ring(zenith), grid.side(relative))
         grounded = zenith > grid.horizon
@@ -226,7 +278,9 @@ class Panorama(eqx.Module):
         """Whether no phase function depends on the wavelength."""
         here = jax.ShapeDtypeStruct((), self.wavelength.dtype)
         look = lambda versine: [
-            x.evaluate(versine, self.wavelength) for x in self.phases
+            y(versine, self.wavelength)
+            for x in self.phases
+            for y in (x.evaluate, x.polarisation)
         ]
         return all(x.shape == (1,) for x in jax.eval_shape(look, here))
 
@@ -247,8 +301,8 @@ class Panorama(eqx.Module):
             around=_FINER * (size.around - 1) + 1,
         )
         grid = Grid(self.grid.first, self.grid.horizon, size)
-        mixing = self._mixing(grid.azimuths())
-        rings = jax.vmap(lambda x: self._rings(x, grid.zeniths()))(self.table)
+        mixing, odd = self._mixing(grid.azimuths()), int(self._polarised)
+        rings = jax.vmap(lambda x: self._rings(x, grid.zeniths(), odd))(self.table)
         table = contract("wa,nhapl->nhwpl", mixing, rings)
         return eqx.tree_at(lambda x: (x.grid, x.table), self, (grid, table))
 

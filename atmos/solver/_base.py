@@ -147,6 +147,8 @@ def _known(x: Number) -> float:
     return math.inf if isinstance(x, Tracer) else float(x)
 
 
+# So far from straight up, in rad, single precision still knows the azimuth.
+_SLIVER = 1e-6
 # Directions that are looked at together: grids of all sizes share a compilation. On a
 # CPU as many as fit into its cache.
 _TOGETHER, _TOGETHER_ON_CPU = 720, 144
@@ -168,7 +170,8 @@ def _tabulate(sky: SolvedSky, position: Position, resolution: Resolution) -> Pan
         return found.reshape(*size, *found.shape[1:])
 
     tables = [table(x) for x in sky.scene.lights]
-    none = jnp.zeros((0, *size, len(phases) + 1, sky.wavelength.size), zenith.dtype)
+    parts = len(phases) + sky.solver.stokes
+    none = jnp.zeros((0, *size, parts, sky.wavelength.size), zenith.dtype)
     return Panorama(
         grid=grid,
         table=jnp.stack(tables) if tables else none,
@@ -211,7 +214,7 @@ def _looks(
 ) -> Float[Array, "ray part wl"]:
     """What one sees by one light, in azimuths relative to it, for a panorama's table.
 
-    Parts whose phase function is isotropic, or partly so, join the last one.
+    Parts whose phase function is isotropic, or partly so, join what has none.
     """
     terms = [x.phase.terms(sky.wavelength) for x in sky.scene.scattering_media]
     east, north = light.horizontal
@@ -220,16 +223,18 @@ def _looks(
         ahead, aside = jnp.cos(azimuth), jnp.sin(azimuth)
         level = [east * ahead + north * aside, north * ahead - east * aside]
         up, flat = jnp.cos(zenith), jnp.sin(zenith)
+        if sky.solver.stokes == 3:  # straight up too it is level in this azimuth
+            flat = jnp.maximum(flat, _SLIVER)
         direction = jnp.stack([flat * level[0], flat * level[1], up])
-        *air, rest = sky._parts(light, position, direction)
-        parts = []
-        for part, mixture in zip(air, terms, strict=True):
+        found = sky._parts(light, position, direction)
+        parts, rest = [], found[len(terms) :]
+        for part, mixture in zip(found, terms, strict=False):
             for phase, weight in mixture:
                 if isinstance(phase, Isotropic):
-                    rest += weight * part * (0.25 / math.pi)
+                    rest = rest.at[0].add(weight * part * (0.25 / math.pi))
                 else:
                     parts.append(weight * part)
-        return jnp.stack([*parts, rest])
+        return jnp.stack([*parts, *rest])
 
     return jax.vmap(look)(zenith, azimuth)
 

@@ -60,12 +60,12 @@ class PathTracing(AbstractSolver):
     """
 
     around: ClassVar[int] = 17
-    stokes: ClassVar[int] = 1
     key: PRNGKeyArray = eqx.field(default_factory=lambda: jax.random.key(0))
     blocks: int = eqx.field(static=True, default=1)
     walks: int = eqx.field(static=True, default=256)
     paths: int = eqx.field(static=True, default=64)
     single: SingleScattering | None = SingleScattering()
+    stokes: int = eqx.field(static=True, init=False, default=1)
 
     def __check_init__(self):
         for name, least in [("blocks", 1), ("walks", 2), ("paths", 1)]:
