@@ -10,12 +10,12 @@ one looks straight up or down, level is as if towards north.
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from .quantity import Angle, as_float, Direction, Number
+from .quantity import Angle, Direction, Number
 
 
 def degree(stokes: Float[Array, "3 *n"]) -> Float[Array, "*n"]:
     """The share of light that is linearly polarised: 0 to 1, and 0 where it is dark."""
-    intensity, q, u = as_float(stokes)
+    intensity, q, u = stokes
     squared = q * q + u * u
     some = (squared > 0.0) & (intensity > 0.0)
     root = jnp.sqrt(jnp.where(some, squared, 1.0))
@@ -27,7 +27,7 @@ def angle(stokes: Float[Array, "3 *n"]) -> Float[Array, "*n"]:
 
     0 is level, and positive where the right end is the higher; 0 without polarisation.
     """
-    _, q, u = as_float(stokes)
+    _, q, u = stokes
     some = (q != 0.0) | (u != 0.0)
     return 0.5 * jnp.arctan2(u, jnp.where(some, q, 1.0))
 

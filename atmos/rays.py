@@ -83,6 +83,16 @@ def radiances(
     return np.asarray(found)[: altitude.size]
 
 
+def polarised_radiances(
+    sky: SolvedSky,
+    altitude: Float[np.ndarray, "ray"],
+    direction: Float[np.ndarray, "ray 3"],
+) -> Float[np.ndarray, "ray wl 3"]:
+    """I, Q and U of the same, in the frame of `atmos.polarisation`."""
+    found = _stokes(sky, *_filled(sky, altitude, direction))
+    return np.moveaxis(np.asarray(found), 1, 2)[: altitude.size]
+
+
 def optical_depths(
     sky: SolvedSky,
     altitude: Float[np.ndarray, "ray"],
@@ -119,6 +129,15 @@ def _radiances(
     direction: Float[Array, "n 3"],
 ) -> Float[Array, "n wl"]:
     return jax.vmap(sky.radiance)(position, direction)
+
+
+@eqx.filter_jit
+def _stokes(
+    sky: SolvedSky,
+    position: Float[Array, "n 3"],
+    direction: Float[Array, "n 3"],
+) -> Float[Array, "n 3 wl"]:
+    return jax.vmap(sky.stokes)(position, direction)
 
 
 @eqx.filter_jit

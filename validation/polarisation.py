@@ -28,6 +28,7 @@ from .claim import Claim, main
 
 
 DEEP = 1000.0
+THIN = 0.1
 SOURCE = "Natraj, Li and Yung 2009"
 
 
@@ -48,10 +49,13 @@ def slab(depths, albedos, cosines):
 @eqx.filter_jit
 def look(sky, mu, azimuth):
     """At the top looking down and at the ground looking up: [2, view, stokes, wl]."""
+    stokes = sky.stokes
+    if sky.solver.stokes == 1:
+        stokes = lambda *place: sky.radiance(*place)[None]
     # Straight up, the azimuth still says which way is level.
     level = jnp.maximum(jnp.sqrt(1.0 - mu * mu), 1e-9)
     flat = [level * jnp.sin(azimuth), level * jnp.cos(azimuth)]
-    see = jax.vmap(sky.stokes, (None, 0))
+    see = jax.vmap(stokes, (None, 0))
     place = jnp.zeros((2, 3)).at[0, 2].set(DEEP)
     up, down = jnp.stack([*flat, -mu], -1), jnp.stack([*flat, mu], -1)
     return jnp.stack([see(place[0], up), see(place[1], down)])
@@ -81,11 +85,71 @@ def solved(axes, columns):
     for sun in sky.scene.lights:
         alone = eqx.tree_at(lambda x: x.scene.lights, sky, (sun,))
         seen = np.asarray(look(alone, mu.ravel(), phi.ravel()))
-        seen = seen.reshape(2, *mu.shape, 3, *depths.shape)
+        seen = seen.reshape(2, *mu.shape, -1, *depths.shape)
         found.append(np.moveaxis(seen, (4, 5), (1, 2)))
     return np.stack(found, 3)
 
 
-def compare(rows, columns):
-    axes, known = table(rows)
-    return solved(axes, columns), known
+def errors(axes, known, columns):
+    """Of I, Q and U, over I, for those optical depths: [row, stokes]."""
+    found = solved(axes, columns)
+    error = np.abs(found - known[..., : columns.stokes]) / known[..., :1]
+    return error.reshape(-1, columns.stokes)
+
+
+def gradients() -> Claim:
+    columns = solver.Columns(streams=4, layers=8, pieces=4, stokes=3)
+    views = np.array([[0.6, 0.0, 0.8], [0.0, 0.8, -0.6], [-0.28, 0.0, 0.96]])
+
+    def total(numbers):
+        depth, rho, cosine, ground = numbers
+        air = medium.Medium(
+            medium.Uniform(0.0, DEEP), depth / DEEP, phase=phase.Rayleigh(rho)
+        )
+        direction = jnp.stack([jnp.sqrt(1.0 - cosine**2), 0.0 * cosine, cosine])
+        sun = light.Sun(direction, 1.0, 0.0)
+        scene = atmos.Scene(geometry.Flat(), DEEP, (air,), (sun,), ground)
+        sky = atmos.solve(scene, columns, jnp.array([500.0]))
+        place = jnp.array([0.0, 0.0, 300.0])
+        seen = jax.vmap(sky.stokes, (None, 0))(place, views)
+        return jnp.sum(seen * jnp.array([1.0, 2.0, 3.0])[None, :, None])
+
+    numbers = jnp.array([0.7, 0.03, 0.6, 0.3])
+    slope, value = jax.jit(jax.grad(total))(numbers), jax.jit(total)
+    steps = 1e-5 * np.eye(4)
+    due = [(value(numbers + x) - value(numbers - x)) / 2e-5 for x in steps]
+    error = np.abs(np.asarray(slope) / np.array(due) - 1.0).max()
+    return Claim("gradients of I, Q and U", "central differences", 1e-5, error)
+
+
+def claims(arguments: argparse.Namespace) -> Iterator[Claim]:
+    folder = arguments.truth
+    if folder is None or not folder.is_dir():
+        print("`--truth` is not a folder: skipped.")
+        return
+    jax.config.update("jax_enable_x64", True)
+    text = (folder / "natraj2009_rayleigh_IQU.csv").read_text()
+    lines = [x for x in text.splitlines() if not x.startswith("#")]
+    (depths, *axes), known = table(list(csv.DictReader(lines)))
+
+    yield gradients()
+    # Thin air wants more streams near the horizon, thick air more layers.
+    thin = sum(x <= THIN for x in depths)
+    fine = solver.Columns(streams=48, layers=40, stokes=3)
+    deep = solver.Columns(streams=32, layers=160, stokes=3)
+    error = [
+        errors([depths[:thin], *axes], known[:, :thin], fine),
+        errors([depths[thin:], *axes], known[:, thin:], deep),
+    ]
+    for name, x in zip("IQU", np.concatenate(error).T, strict=True):
+        yield Claim(f"{name} over I, {x.size} directions", SOURCE, 1e-4, x.max())
+        yield Claim("    median", SOURCE, None, np.median(x))
+    usual = errors([depths, *axes], known, solver.Columns(stokes=3))
+    yield Claim("I, Q, U over I, 16 streams, 60 layers", SOURCE, 5e-3, usual.max())
+    yield Claim("    median", SOURCE, None, np.median(usual))
+    alone = errors([depths, *axes], known, solver.Columns())
+    yield Claim("I without polarisation", SOURCE, None, alone.max())
+
+
+if __name__ == "__main__":
+    sys.exit(main(__doc__, claims))

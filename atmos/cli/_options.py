@@ -50,6 +50,13 @@ Solver = Annotated[
         "(suns well above the horizon); single for light that turned once."
     ),
 ]
+Stokes = Annotated[
+    Literal[1, 3],
+    option(
+        "3 for polarised light, I, Q and U: Q counts what vibrates level minus "
+        "upright, U what rises to the right minus what falls; 1 for radiance alone."
+    ),
+]
 File = Annotated[Path, option("A scene file; see `atmos scene`.")]
 
 

@@ -9,11 +9,12 @@ import numpy as np
 from .. import colour, image
 from ..camera import AbstractCamera, LatLong
 from ..disk import render_disks
-from ..render import render
+from ..render import render, render_stokes
 from ..scene import Scene
+from ..solver import AbstractSolver
 from ._app import app, CAMERA, flat, option, OUTPUT, refuse, SUN, WORLD
 from ._lamp import header, measure_lamp
-from ._options import Files, observed, Solver, SunPosition, View, World
+from ._options import Files, observed, Solver, Stokes, SunPosition, View, World
 from ._session import progress_bar, start
 from ._world import make_scene, solve_file, solver_named
 
@@ -27,6 +28,7 @@ def sky(
     /,
     *,
     solver: Solver = "single",
+    stokes: Stokes = 1,
     world: Annotated[World | None, flat(WORLD)] = None,
     sun: Annotated[SunPosition | None, flat(SUN)] = None,
     view: Annotated[View | None, flat(CAMERA)] = None,
@@ -34,7 +36,8 @@ def sky(
 ) -> None:
     """Render the sky as an OpenEXR picture, and a PNG to look at.
 
-    Values are radiances; the header of the file has their unit, and the scene.
+    Values are radiances; the header of the file has their unit, and the scene. With
+    --stokes 3 layers Q and U hold how the light is polarised.
 
     For example:
 
@@ -56,14 +59,15 @@ def sky(
     wavelength = np.array(files.wavelength, np.float32)
     step = (wavelength[-1] - wavelength[0]) / max(1, wavelength.size - 1) or 10.0
     found = make_scene(scene, world, sun, float(step))
-    said = observed(sun, view)
-    write_picture(found, scene, solver, view.camera(), wavelength, files, preview, said)
+    said, camera = observed(sun, view), view.camera()
+    how = solver_named(solver, stokes, float(camera.position[2]))
+    write_picture(found, scene, how, camera, wavelength, files, preview, said)
 
 
 def write_picture(
     scene: Scene,
     path: Path | None,
-    method: str,
+    solver: AbstractSolver,
     camera: AbstractCamera,
     wavelength: np.ndarray,
     files: Files,
@@ -79,7 +83,6 @@ def write_picture(
     bands = jnp.asarray(wavelength)
     weights = colour.response(bands) if seen else None
     response = None if spectral else space.from_xyz(weights)
-    solver = solver_named(method, float(camera.position[2]))
     sky = solve_file(scene, solver, bands, path)
 
     # First what may be refused.
@@ -88,13 +91,18 @@ def write_picture(
         rule = "cannot hold the sun's disk; leave it to a lamp with --no-sun"
         refuse("--half", rule, f"{np.max(disks):g}")
     lamps = [measure_lamp(sky, x, camera, space, weights) for x in sky.scene.lights]
+    look = render if solver.stokes == 1 else render_stokes
     with progress_bar("sky") as tell:
-        picture = np.asarray(render(sky, camera, response, progress=tell))
+        picture = np.asarray(look(sky, camera, response, progress=tell))
+    polarised = None
+    if solver.stokes == 3:
+        picture, polarised = picture[0], picture[1:]
     picture = picture + disks.astype(picture.dtype)
 
     said = header(scene, solver, wavelength, lamps) | observed
     latlong = isinstance(camera, LatLong)
     kind = {"half": files.half, "latlong": latlong, "attributes": said}
+    kind["stokes"] = polarised
     if spectral:
         image.write_spectral_exr(files.output, picture, wavelength, **kind)
     else:

@@ -16,6 +16,7 @@ from ..rays import (
     direction,
     optical_depths,
     padded,
+    polarised_radiances,
     radiances,
 )
 from ..scenefile import load
@@ -27,6 +28,7 @@ from ._options import (
     Output,
     Precise,
     Solver,
+    Stokes,
     Wavelengths,
     Zeniths,
 )
@@ -40,6 +42,7 @@ def radiance(
     /,
     *,
     solver: Solver = "single",
+    stokes: Stokes = 1,
     sun_zenith: Annotated[
         tuple[float, ...] | None,
         numbers_option("Zenith angles of the sun, in degrees.", 0, 180),
@@ -59,7 +62,8 @@ def radiance(
     All combinations of the numbers given; a view zenith beyond 90 looks down.
 
     sun_zenith, view_zenith, azimuth are in degrees, altitude in m, wavelength in
-    nm, and radiance in W m^-2 sr^-1 nm^-1 if that is the scene's irradiance per sr.
+    nm, and radiance in W m^-2 sr^-1 nm^-1 if that is the scene's irradiance per sr;
+    with --stokes 3 q and u, in the same unit, follow.
 
     For example:
 
@@ -81,12 +85,14 @@ def radiance(
         for zenith in suns:
             light = direction(zenith, towards).astype(bands.dtype)
             lit = eqx.tree_at(lambda x: x.lights[0].direction, found, light)
-            sky = solve_file(lit, solver_named(solver), bands, scene)
+            sky = solve_file(lit, solver_named(solver, stokes), bands, scene)
             for height, tilt, turn in combinations(sky, *axes):
-                values = radiances(sky, height, direction(tilt, towards + turn))
+                values = look(sky, height, direction(tilt, towards + turn))
                 yield (np.full(height.shape, zenith), height, tilt, turn), values
 
+    look = radiances if stokes == 1 else polarised_radiances
     names = "sun_zenith,altitude,view_zenith,azimuth,wavelength,radiance"
+    names = names if stokes == 1 else f"{names},q,u"
     count = len(suns) * math.prod(x.size for x in axes)
     write_table(output, names, wavelength, blocks(), count)
 
@@ -137,6 +143,7 @@ def write_table(
 ) -> None:
     """Writes rows as CSV, a line for each ray and wavelength."""
 
+    name = names.split(",wavelength,")[1].split(",")[0]
     bands = [f"{x:.10g}" for x in wavelength]
 
     def write(file):
@@ -145,16 +152,18 @@ def write_table(
             if done == 0:
                 file.write(f"{names}\n")
             if not np.all(np.isfinite(values)):
-                raise ValueError(f"`{names.split(',')[-1]}` is not finite somewhere.")
+                raise ValueError(f"`{name}` is not finite somewhere.")
+            values = values.reshape(*values.shape[:2], -1)
             digits = 17 if values.dtype == np.float64 else 9
             for *row, line in zip(*columns, values.tolist(), strict=True):
                 start = ",".join(f"{x:.10g}" for x in row)
-                for band, value in zip(bands, line, strict=False):
-                    file.write(f"{start},{band},{value:.{digits}g}\n")
+                for band, found in zip(bands, line, strict=False):
+                    text = ",".join(f"{x:.{digits}g}" for x in found)
+                    file.write(f"{start},{band},{text}\n")
             done += len(values)
             tell(done / count)
 
-    with progress_bar(names.split(",")[-1]) as tell:
+    with progress_bar(name) as tell:
         if output is None:
             write(sys.stdout)
             return

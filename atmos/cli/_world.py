@@ -108,14 +108,18 @@ def about(options: dict[str, str]) -> Iterator[None]:
         raise ValueError(text) from error
 
 
-def solver_named(name: str, altitude: float | None = None) -> AbstractSolver:
+def solver_named(
+    name: str, stokes: int = 1, altitude: float | None = None
+) -> AbstractSolver:
     """The solver of that name, at its finest; or for pictures from an altitude.
 
     From high above, rays pass more edges of media than the quick solver tells apart.
     """
     quick = altitude is not None and altitude < 20.0 * km
     single = QUICK if quick else SingleScattering()
-    return Columns(single=single) if name == "columns" else single
+    if name == "columns":
+        return Columns(single=single, stokes=stokes)
+    return dataclasses.replace(single, stokes=stokes)
 
 
 def solve_file(
