@@ -202,7 +202,7 @@ def test_single_precision_is_right_to_1e4():
 
 @eqx.filter_jit
 def slopes(direction):
-    """Of light that turned once; those of all light are in `validation.polarisation`."""
+    """Of light that turned once; for the rest see `validation.polarisation`."""
 
     def total(x):
         numbers, view = x
