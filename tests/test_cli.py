@@ -192,6 +192,25 @@ def test_spectral_pictures_hold_the_same_light(capsys):
     )
 
 
+def test_polarised_light_has_columns_and_layers_of_its_own(capsys):
+    air = THIN.split("phase")[0] + 'phase = { kind = "rayleigh" }\n'
+    Path("sunny.toml").write_text(air)
+    out, _ = run(
+        capsys, "radiance sunny.toml --stokes 3 --view-zenith 30 --azimuth 180"
+    )
+    (row, *_) = rows(out)
+    assert list(row)[-3:] == ["radiance", "q", "u"]
+    # Light that turned by a right angle is all polarised, across the sun's plane.
+    light = [float(row[x]) for x in ("radiance", "q", "u")]
+    assert light[0] > 0.0
+    np.testing.assert_allclose(light[1:], [light[0], 0.0], atol=1e-6 * light[0])
+    sky(capsys, "--stokes 3 --no-preview --no-sun")
+    picture = read_exr("sky.exr")
+    q, u = (picture.stack(*(f"{x}.{y}" for y in "RGB")) for x in "QU")
+    share = np.sqrt(q**2 + u**2)[:16] / picture.stack("R", "G", "B")[:16]
+    assert 0.97 < share.max() < 1.001
+
+
 def test_halves_that_cannot_hold_the_sun_are_refused_and_nothing_is_written(capsys):
     Path("sky.exr").write_text("what was there")
     bright = SUNNY.replace('"solar"', '"solar", distance = 0.01')

@@ -106,7 +106,8 @@ def errors(axes, known, columns):
     return error.reshape(-1, columns.stokes)
 
 
-ZENITHS = [10.0, 30.0, 60.0, 75.0, 85.0, 89.0, 120.0, 150.0]
+# Nearer to the zenith theirs turn with the azimuth less than they should.
+ZENITHS = [30.0, 45.0, 60.0, 75.0, 85.0, 89.0, 120.0, 150.0]
 AZIMUTHS = [0.0, 45.0, 90.0, 150.0, 180.0]
 
 
