@@ -101,8 +101,12 @@ def write_picture(
 
     said = header(scene, solver, wavelength, lamps) | observed
     latlong = isinstance(camera, LatLong)
-    kind = {"half": files.half, "latlong": latlong, "attributes": said}
-    kind["stokes"] = polarised
+    kind = {
+        "stokes": polarised,
+        "half": files.half,
+        "latlong": latlong,
+        "attributes": said,
+    }
     if spectral:
         image.write_spectral_exr(files.output, picture, wavelength, **kind)
     else:

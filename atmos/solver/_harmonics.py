@@ -5,16 +5,24 @@ an angle theta from the zenith turn with the vertical plane that they are counte
 for them they are Wigner's functions d^l_(n,m)(theta) with n = 2 and -2, the generalised
 spherical functions. Of a field that is alike to the left and the right of the sun,
 
-    I = sum T_lm P_lm cos(m phi),
-    Q = sum (E_lm R_lm + B_lm S_lm) cos(m phi),
-    U = sum (E_lm S_lm + B_lm R_lm) sin(m phi),
+    I = sum (l + 1/2) T_lm P_lm cos(m phi),
+    Q = sum (l + 1/2) (E_lm R_lm + B_lm S_lm) cos(m phi),
+    U = sum (l + 1/2) (E_lm S_lm + B_lm R_lm) sin(m phi),
 
-with P of `harmonics`, R and S of `spin_harmonics` of cos theta, phi the azimuth from
-the sun's clockwise seen from above, and Q and U as in `atmos.polarisation`
-(Siewert 1982). Reversed directions give (-1)^(l + m) times P, R and -S. Scattering
-turns T, E and B of each l and m into
+with P of `harmonics`, R and S of `spin_harmonics` of the cosine of theta, phi the
+azimuth from the sun's clockwise seen from above, and Q and U as in `atmos.polarisation`
+(Siewert 1982). With I_m and Q_m what goes with cos(m phi), and U_m with sin(m phi), the
+moments are integrals over that cosine from -1 to 1,
 
-    (alpha1 T + beta1 E, beta1 T + alpha2 E, alpha3 B).
+    T of I_m P,  E of Q_m R + U_m S,  B of Q_m S + U_m R.
+
+Scattering turns those of each l and m into
+
+    (alpha1 T + beta1 E, beta1 T + alpha2 E, alpha3 B),
+
+with the moments of a phase function, times its coefficient. A beam without polarisation
+has T alone: P_lm of its own direction times 1 / (2 pi), or 1 / pi where m > 0, for an
+irradiance of 1. Reversed directions give (-1)^(l + m) times P, R and -S.
 """
 
 import functools as ft
