@@ -59,8 +59,11 @@ class Field(eqx.Module):
         point: Point,
         light: Sun,
         view: Direction,
-    ) -> Float[Array, "stokes wl"]:
-        """What a metre adds to the light that arrives from direction `view`."""
+    ) -> tuple[Float[Array, "wl"], ...]:
+        """What a metre adds to the light that arrives from direction `view`.
+
+        Alone, or I, Q and U: apart from each other, as that is quicker to compute.
+        """
         count = scattering.shape[0]
         l, m = pairs(count)
         cosine = -jnp.dot(point.up, view)
@@ -68,12 +71,12 @@ class Field(eqx.Module):
         turn = turn * _cosines(point.up, view, light.direction, count)[m]
         turn = turn * jnp.asarray(l + 0.5, turn.dtype)
         moments = self._look(self.moments, light, point)
-        radiance, rest = moments[: len(l)], moments[len(l) :]
-        seen = jnp.sum(turn[:, None] * scattering[l] * radiance, 0)[None]
         if self.stokes == 1:
-            return seen
+            return (jnp.sum(turn[:, None] * scattering[l] * moments, 0),)
+        radiance, rest = moments[: len(l)], moments[len(l) :]
+        seen = jnp.sum(turn[:, None] * scattering[l] * radiance, 0)
         more = scattered(polarised, radiance, rest, point.up, view, light.direction)
-        return jnp.pad(seen, ((0, 2), (0, 0))) + more
+        return seen + more[0], more[1], more[2]
 
     def gather(
         self,
@@ -104,7 +107,7 @@ class Field(eqx.Module):
             scattering = contract("jm,mkl->jkl", density, self.mixture.scattering)
             polarised = contract("jm,mkpl->jkpl", density, self.mixture.polarised)
             shine = lambda s, p, x: self.source(s, p, x, light, direction)
-            source = length * jax.vmap(shine)(scattering, polarised, points)
+            source = jax.vmap(shine)(scattering, polarised, points)
             depth, within = (
                 contract("j,jl->l", w, lost),
                 contract("ij,jl->il", inner, lost),
@@ -115,16 +118,18 @@ class Field(eqx.Module):
             empty = even <= 0.0
             whole = -jnp.expm1(-depth) / jnp.where(empty, 1.0, even)
             whole = jnp.where(empty, 1.0, whole)
-            seen = jnp.sum(share[:, None] * source, 0)
-            return passed + depth, (jnp.exp(-passed) * whole)[None] * seen
+            arrives = jnp.exp(-passed) * whole
+            seen = tuple(arrives * jnp.sum(share * (length * x), 0) for x in source)
+            return passed + depth, seen
 
         passed, seen = jax.lax.scan(piece, jnp.zeros_like(wavelength), (begin, length))
         foot = path.at(far)
         foot = Point(foot.position, jnp.zeros_like(far), foot.up)
         _, down = self.fluxes(light, foot)
         ground = scene.ground.evaluate(wavelength) / math.pi * down * jnp.exp(-passed)
-        total = jnp.sum(seen, 0).at[0].add(jnp.where(grounded, ground, 0.0))
-        return total * light.irradiance.evaluate(wavelength)[None]
+        radiance, *rest = (jnp.sum(x, 0) for x in seen)
+        total = [radiance + jnp.where(grounded, ground, 0.0), *rest]
+        return jnp.stack(total) * light.irradiance.evaluate(wavelength)[None]
 
 
 def _cosines(
