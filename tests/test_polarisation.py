@@ -296,7 +296,7 @@ class Formula(AbstractSolver):
     """Light that is known: of air that scatters evenly, and some more."""
 
     around: ClassVar[int] = 9
-    stokes: int = 3
+    stokes: int = eqx.field(static=True, default=3)
 
     def prepare(self, scene, wavelength):
         return None
@@ -305,7 +305,8 @@ class Formula(AbstractSolver):
         sun, (x, y, z) = light.direction, direction
         ahead, aside = sun[0] * x + sun[1] * y, x * sun[1] - y * sun[0]
         parts = [1.0 + z * z, 2.0 + ahead, (1.0 - z * z) * ahead, z * ahead * aside]
-        return jnp.stack(parts)[:, None] * jnp.ones_like(wavelength)[None]
+        parts = jnp.stack(parts[: 1 + self.stokes])[:, None]
+        return parts * jnp.ones_like(wavelength)[None]
 
 
 @eqx.filter_jit
@@ -357,7 +358,12 @@ def test_other_numbers_of_stokes_parameters_are_refused(kind):
         kind(stokes=4)
     with pytest.raises(ValueError, match="`streams` must be at least 4"):
         Columns(streams=2, stokes=3)
-    sky = solve(world(at(0.1)), SingleScattering(), NM)
+
+
+def test_skies_without_polarisation_have_no_stokes_parameters():
+    air = Medium(Uniform(0.0, DEEP), 0.1 / DEEP, phase=Rayleigh())
+    sun = Sun(np.array([0.0, 0.0, 1.0]), 1.0, 0.0)
+    sky = solve(Scene(Flat(), DEEP, (air,), (sun,)), Formula(stokes=1), NM)
     with pytest.raises(ValueError, match="`stokes` 3"):
         sky.stokes(jnp.zeros(3), jnp.array([0.0, 0.0, 1.0]))
     with pytest.raises(ValueError, match="`stokes` 3"):
