@@ -10,4 +10,5 @@ from .path_tracing import (
     PathTracing as PathTracing,
     Tally as Tally,
 )
+from .shared import Shared as Shared
 from .single_scattering import QUICK as QUICK, SingleScattering as SingleScattering

@@ -32,8 +32,20 @@ class AbstractSolver(eqx.Module):
 
     around: ClassVar[int]
 
-    def check(self, scene: Scene) -> None:
-        """Raises `ValueError` for a scene that the method does not hold for."""
+    def check(self, scene: Scene, wavelength: Wavelength) -> Scene:
+        """The scene, if the method holds for it; raises `ValueError` otherwise.
+
+        Where that hangs on numbers yet to be traced, what is made of the scene raises
+        when it is run.
+        """
+        return scene
+
+    def baked(self, scene: Scene) -> Scene:
+        """All of a scene that `prepare` is told: less than the whole if that will do.
+
+        What was worked out then serves every scene that differs in the rest alone.
+        """
+        return scene
 
     @abc.abstractmethod
     def prepare(self, scene: Scene, wavelength: Wavelength) -> PyTree[Any]:
@@ -213,9 +225,9 @@ def solve(scene: Scene, solver: AbstractSolver, wavelength: ArrayLike) -> Solved
         nm = eqx.error_if(nm, ~known, "`wavelength` must lie between 100 and 1e5 nm.")
     else:
         _check_wavelength(scene, np.asarray(nm))
-    solver.check(scene)
     scene = jax.tree.map(lambda x: x.astype(nm.dtype), scene)
-    prepared = _prepare(solver, scene, nm)
+    scene = solver.check(scene, nm)
+    prepared = _prepare(solver, solver.baked(scene), nm)
     return SolvedSky(scene=scene, solver=solver, wavelength=nm, prepared=prepared)
 
 

@@ -57,10 +57,10 @@ class Columns(AbstractSolver):
     nodes: int = eqx.field(static=True, default=3)
     single: SingleScattering = SingleScattering()
 
-    def check(self, scene: Scene) -> None:
+    def check(self, scene: Scene, wavelength: Wavelength) -> Scene:
         check_layered(scene)
         if isinstance(scene.geometry, Flat):
-            return
+            return scene
         for i, light in enumerate(scene.lights):
             zenith = light.zenith
             if not isinstance(zenith, Tracer) and zenith > _LOWEST:
@@ -69,6 +69,7 @@ class Columns(AbstractSolver):
                     "higher, for columns in a round world; got "
                     f"{90.0 - float(zenith) / deg:.6g}."
                 )
+        return scene
 
     def prepare(self, scene: Scene, wavelength: Wavelength) -> Field:
         mixed = mixture(scene, wavelength, self.streams + 1).truncated()
