@@ -10,17 +10,17 @@ from jaxtyping import Array, Float
 
 from ..geometry import AbstractPath
 from ..optics import Mixture
-from ..quantity import Depth, Length, Number
+from ..quantity import Depth
 from ..scene import Scene
-from ..transport import columns, contract, densities, gauss_legendre
+from ..transport import contract, densities, gauss_legendre
 from ._sight import cut
+from ._slants import horizons, slants
 
 
 # Directions around a place: rings above its horizon and as many below, and azimuths on
 # half of each, as the other half is alike: 64 in all.
 _RINGS, _TURNS = 4, 4
 _PIECES = 20  # of a line of sight
-_SLANTS = 32  # of the sun
 
 
 class Turns(eqx.Module):
@@ -58,10 +58,11 @@ def turns(
     zeniths: Float[Array, "sun"],
 ) -> Turns:
     """What suns at these zenith angles do, and light that comes from everywhere."""
-    slants = _slants(scene, altitude)
-    turn = jnp.asarray((np.arange(_TURNS) + 0.5) * (math.pi / _TURNS), altitude.dtype)
+    towards = slants(scene, altitude)
+    turn = (np.arange(_TURNS) + 0.5)[None] * (math.pi / _TURNS)
+    turn = jnp.asarray(turn, altitude.dtype)
     level, rise = jnp.sin(zeniths)[:, None], jnp.cos(zeniths)[:, None]
-    suns = [level * jnp.cos(turn), level * jnp.sin(turn), rise + 0.0 * turn]
+    suns = [level * jnp.cos(turn), level * jnp.sin(turn), rise + jnp.zeros_like(turn)]
     suns = jnp.stack(suns, -1)
 
     def look(ray):
@@ -77,7 +78,7 @@ def turns(
         places = jnp.concatenate([begin + 0.5 * length, span.far[None]])
         points = jax.vmap(path.at)(places)
         rises = contract("pc,sac->psa", points.up, suns)
-        depth = jax.vmap(slants.depths, (0, 0, None))(
+        depth = jax.vmap(towards.depths, (0, 0, None))(
             points.altitude, rises, mixture.extinction
         )
         left = jnp.exp(-depth)
@@ -86,22 +87,23 @@ def turns(
         once = contract("psa,psal,pl->sl", lit, left[:-1], turned)
         ground = jnp.where(span.grounded, jnp.exp(-passed), 0.0)
         bounced = contract("sa,sal->sl", jnp.maximum(rises[-1], 0.0), left[-1])
-        once = 0.25 * once + albedo * ground * bounced
+        once = 0.25 * once + (albedo * ground)[None] * bounced
         return once / (math.pi * _TURNS), jnp.sum(turned, 0), ground
 
     cosine, weight = _views(scene, altitude)
     above = jnp.broadcast_to(altitude[:, None], cosine.shape)
-    found = jax.lax.map(look, (above.ravel(), cosine.ravel()))
+    # A gradient would else keep every step of every ray.
+    found = jax.lax.map(jax.checkpoint(look), (above.ravel(), cosine.ravel()))
     found = [x.reshape(*cosine.shape, *x.shape[1:]) for x in found]
     return Turns(cosine, weight, *found)
 
 
 def _views(scene: Scene, altitude: Float[Array, "level"]) -> tuple[Array, Array]:
     """Cosines from straight up by Gauss and Legendre, above and below the horizon."""
-    horizon = -jnp.sin(scene.geometry.dip(altitude, jnp.zeros_like(altitude)))
-    horizon = horizon[:, None]
+    horizon = horizons(scene, altitude)[:, None]
     u, w = (jnp.asarray(x, altitude.dtype) for x in gauss_legendre(_RINGS))
     above, below = 1.0 - horizon, 1.0 + horizon
+    u, w = u[None], w[None]
     cosine = jnp.concatenate([horizon + above * u, horizon - below * u], 1)
     return cosine, 0.5 * jnp.concatenate([above * w, below * w], 1)
 
@@ -142,67 +144,3 @@ def _lit(
     end = (begin + length)[..., None]
     hidden = jnp.diff(jnp.clip(dark[None], begin[..., None], end))[..., 0]
     return jnp.clip(1.0 - hidden / jnp.where(length > 0.0, length, 1.0), 0.0, 1.0)
-
-
-class _Slants(eqx.Module):
-    """The columns of media towards the sun, by altitude and the sun's height.
-
-    That is counted from where the ground would hide the sun, 0, to the zenith, 1, by
-    its square. Kept are columns relative to how they would roughly grow.
-    """
-
-    altitude: Float[Array, "level"]
-    horizon: Float[Array, "level"]
-    softening: Number
-    table: Float[Array, "level slant medium"]
-
-    def growth(self, above: Array) -> Array:
-        """Roughly how columns fall as the sun's cosine rises above the horizon's."""
-        return jnp.maximum(above + self.softening, 1e-6)
-
-    def depths(
-        self,
-        altitude: Length,
-        rises: Float[Array, "sun turn"],
-        extinction: Float[Array, "medium wl"],
-    ) -> Float[Array, "sun turn wl"]:
-        """Optical depths up to suns of these cosines from straight up."""
-        k = jnp.searchsorted(self.altitude, altitude, side="right") - 1
-        k = jnp.clip(k, 0, len(self.altitude) - 2)
-        step = self.altitude[k + 1] - self.altitude[k]
-        x = (altitude - self.altitude[k]) / jnp.where(step > 0.0, step, 1.0)
-        x = jnp.clip(x, 0.0, 1.0)
-        row = (1.0 - x) * self.table[k] + x * self.table[k + 1]
-        horizon = (1.0 - x) * self.horizon[k] + x * self.horizon[k + 1]
-        above = jnp.maximum(rises - horizon, 0.0)
-        positive = above > 0.0
-        root = jnp.sqrt(jnp.where(positive, above / (1.0 - horizon), 1.0))
-        place = jnp.where(positive, root, 0.0) * (_SLANTS - 1)
-        i = jnp.clip(jnp.floor(place), 0.0, _SLANTS - 2.0)
-        y = (place - i)[..., None]
-        i = i.astype(jnp.int32)
-        row = contract("xm,ml->xl", row, extinction)
-        depth = (1.0 - y) * row[i] + y * row[i + 1]
-        return depth / self.growth(above)[..., None]
-
-
-def _slants(scene: Scene, altitude: Float[Array, "level"]) -> _Slants:
-    dip = scene.geometry.dip(altitude, jnp.zeros_like(altitude))
-    horizon = -jnp.sin(dip)
-    share = jnp.asarray(np.linspace(0.0, 1.0, _SLANTS) ** 2, altitude.dtype)
-    # About the cosine below which the roundness of the world matters.
-    empty = _Slants(altitude, horizon, 0.15 * dip[-1], jnp.zeros((1, 1, 1), dip.dtype))
-
-    def column(altitude, above, cosine):
-        start = scene.geometry.locate(jnp.zeros(3, altitude.dtype).at[2].set(altitude))
-        level = jnp.sqrt(jnp.maximum(1.0 - cosine * cosine, 0.0))
-        direction = jnp.stack([level, jnp.zeros_like(level), cosine])
-        path = scene.geometry.path(start, direction)
-        # Not `span`: what grazes the ground may by rounding end there.
-        far = jnp.maximum(path.crossings(scene.top)[1], 0.0)
-        return columns(scene, path, far, nodes=6) * empty.growth(above)
-
-    above = (1.0 - horizon[:, None]) * share
-    each = jax.vmap(jax.vmap(column, (None, 0, 0)))
-    table = each(altitude, above, horizon[:, None] + above)
-    return eqx.tree_at(lambda x: x.table, empty, table)

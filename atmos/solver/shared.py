@@ -1,4 +1,5 @@
 import dataclasses
+import math
 from typing import ClassVar
 
 import equinox as eqx
@@ -67,15 +68,17 @@ class Shared(AbstractSolver):
         altitude = layers(scene, mixed.extinction, self.layers).altitude
         # Farther round the world no sun lights any air that the lowest air sees.
         dip = scene.geometry.dip(scene.top, jnp.zeros_like(scene.top))
-        suns = EverySun(0.5 * jnp.pi + 2.0 * dip, self.suns)
+        suns = EverySun(0.5 * math.pi + 2.0 * dip, self.suns)
         albedo = jnp.broadcast_to(scene.ground.evaluate(wavelength), wavelength.shape)
         found = turns(scene, mixed, albedo, altitude, suns.zeniths())
 
         # Light that turned in the air comes down, and the ground returns some of it.
-        down = found.flux(found.again, 1.0)[0] / jnp.pi
-        again = found.again + found.ground * albedo * down
-        light = found.mean(found.once) / (1.0 - found.mean(again))[:, None]
-        whole = found.once + again[:, :, None] * light[:, None]
+        bright = found.ground * (albedo / math.pi)[None, None]
+        down = lambda light: found.flux(light, 1.0)[:1, None]
+        once = found.once + bright[:, :, None] * down(found.once)
+        again = found.again + bright * down(found.again)
+        light = found.mean(once) / (1.0 - found.mean(again))[:, None]
+        whole = once + again[:, :, None] * light[:, None]
         by_sun = lambda x: jnp.swapaxes(x, 0, 1)
         return Field(
             mixed,
