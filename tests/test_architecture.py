@@ -38,6 +38,7 @@ ROOMS = [
     "disk",
     "rays",
     "scenefile",
+    "bake",
     "cli",
 ]
 

@@ -22,6 +22,8 @@ from ..scenefile import load
 from ._app import app, numbers_option, refuse
 from ._options import (
     Altitudes,
+    Bake,
+    check_bake,
     check_output,
     File,
     Output,
@@ -51,6 +53,7 @@ def radiance(
         numbers_option("View azimuths relative to the sun's, in degrees.", -360, 360),
     ] = (0.0,),
     wavelength: Wavelengths = (450.0, 550.0, 650.0),
+    bake: Bake = None,
     output: Output = None,
     float64: Precise = False,
 ) -> None:
@@ -67,6 +70,7 @@ def radiance(
     """
     if output is not None:
         check_output("--output", output)
+    check_bake(bake, solver)
     start(float64)
 
     found = load(scene)
@@ -74,6 +78,9 @@ def radiance(
         refuse("sun", "must be one alone", f"{len(found.lights)} in '{scene}'")
     own, towards = angles(np.asarray(found.lights[0].direction))
     suns = (own,) if sun_zenith is None else sun_zenith
+    method = solver_named(solver)
+    if bake is not None and len(suns) > 1 and method.baked(found).lights:
+        refuse("--bake", f"serves one sun with --solver {solver}", len(suns))
     bands = padded(np.array(wavelength, np.float64 if float64 else np.float32))
     axes = [np.array(x) for x in (altitude, view_zenith, azimuth)]
 
@@ -81,7 +88,7 @@ def radiance(
         for zenith in suns:
             light = direction(zenith, towards).astype(bands.dtype)
             lit = eqx.tree_at(lambda x: x.lights[0].direction, found, light)
-            sky = solve_file(lit, solver_named(solver), bands, scene)
+            sky = solve_file(lit, method, bands, scene, bake)
             for height, tilt, turn in combinations(sky, *axes):
                 values = radiances(sky, height, direction(tilt, towards + turn))
                 yield (np.full(height.shape, zenith), height, tilt, turn), values

@@ -8,6 +8,7 @@ from pathlib import Path
 import equinox as eqx
 from jaxtyping import ArrayLike
 
+from .. import bake
 from ..light import SOLAR_RADIUS, Sun, sunlight
 from ..particle.surface import albedo
 from ..quantity import km
@@ -18,6 +19,7 @@ from ..solver import (
     AbstractSolver,
     Columns,
     QUICK,
+    Shared,
     SingleScattering,
     solve,
     SolvedSky,
@@ -115,15 +117,28 @@ def solver_named(name: str, altitude: float | None = None) -> AbstractSolver:
     """
     quick = altitude is not None and altitude < 20.0 * km
     single = QUICK if quick else SingleScattering()
-    return Columns(single=single) if name == "columns" else single
+    more = {"columns": Columns, "shared": Shared}
+    return more[name](single=single) if name in more else single
 
 
 def solve_file(
-    scene: Scene, solver: AbstractSolver, bands: ArrayLike, path: Path | None
+    scene: Scene,
+    solver: AbstractSolver,
+    bands: ArrayLike,
+    path: Path | None,
+    kept: Path | None = None,
 ) -> SolvedSky:
-    """The sky of a scene; errors about a scene that was read name its file and keys."""
+    """The sky of a scene; errors about a scene that was read name its file and keys.
+
+    With `kept`, from that file if there is one; else there will be.
+    """
     try:
-        return solve(scene, solver, bands)
+        if kept is not None and kept.exists():
+            return bake.load(kept, scene, solver, bands)
+        sky = solve(scene, solver, bands)
+        if kept is not None:
+            bake.save(sky, kept)
+        return sky
     except ValueError as error:
         if path is None:
             raise

@@ -1,5 +1,6 @@
 from ._base import (
     AbstractSolver as AbstractSolver,
+    admit as admit,
     solve as solve,
     SolvedSky as SolvedSky,
 )

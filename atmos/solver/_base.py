@@ -217,6 +217,15 @@ def solve(scene: Scene, solver: AbstractSolver, wavelength: ArrayLike) -> Solved
     wavelengths are one-dimensional, lie between 100 nm and 100 um, and every table of
     the scene covers them; and for a scene that the solver does not hold for.
     """
+    scene, nm = admit(scene, solver, wavelength)
+    prepared = _prepare(solver, solver.baked(scene), nm)
+    return SolvedSky(scene=scene, solver=solver, wavelength=nm, prepared=prepared)
+
+
+def admit(
+    scene: Scene, solver: AbstractSolver, wavelength: ArrayLike
+) -> tuple[Scene, Wavelength]:
+    """A scene and wavelengths as a solver is told them, or the errors of `solve`."""
     nm = as_float(wavelength)
     if nm.ndim != 1:
         raise ValueError(f"`wavelength` must be one-dimensional; got shape {nm.shape}.")
@@ -226,9 +235,7 @@ def solve(scene: Scene, solver: AbstractSolver, wavelength: ArrayLike) -> Solved
     else:
         _check_wavelength(scene, np.asarray(nm))
     scene = jax.tree.map(lambda x: x.astype(nm.dtype), scene)
-    scene = solver.check(scene, nm)
-    prepared = _prepare(solver, solver.baked(scene), nm)
-    return SolvedSky(scene=scene, solver=solver, wavelength=nm, prepared=prepared)
+    return solver.check(scene, nm), nm
 
 
 @eqx.filter_jit

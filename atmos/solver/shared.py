@@ -38,8 +38,16 @@ class Shared(AbstractSolver):
     1976), are taken as not scattered. A line of sight takes `nodes` places in each of
     `pieces` pieces. It serves every sun.
 
+    Against path tracing in the round, mean and largest error beyond 1 degree above the
+    horizon, without and with aerosol: 1.5 and 8 %, 3 and 28 % for suns 60 degrees from
+    the zenith, 4 and 30 %, 7 and 100 % (beside the sun) at 88, 9 and 11 % on average at
+    96; from space half of the light beyond the terminator is wrong. In flat slabs of
+    depth 1 the mean error is 4 to 8 % and the largest 30 %, at depth 2 twice that, and
+    then it grows fast: the series sums up what has long left sideways or upwards.
+
     Raises `ValueError` where a medium does not depend on altitude alone, where media
-    have more edges than there are layers, and where what scatters is thicker than 1.
+    have more edges than there are layers, and where more than an optical depth of 1 is
+    scattered, peaks apart, from the ground straight up.
     """
 
     around: ClassVar[int] = 9
