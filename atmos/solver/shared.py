@@ -38,12 +38,13 @@ class Shared(AbstractSolver):
     1976), are taken as not scattered. A line of sight takes `nodes` places in each of
     `pieces` pieces. It serves every sun.
 
-    Against path tracing in the round, mean and largest error beyond 1 degree above the
-    horizon, without and with aerosol: 1.5 and 8 %, 3 and 28 % for suns 60 degrees from
-    the zenith, 4 and 30 %, 7 and 100 % (beside the sun) at 88, 9 and 11 % on average at
-    96; from space half of the light beyond the terminator is wrong. In flat slabs of
-    depth 1 the mean error is 4 to 8 % and the largest 30 %, at depth 2 twice that, and
-    then it grows fast: the series sums up what has long left sideways or upwards.
+    Against path tracing in the round, from the ground, mean and largest error: for suns
+    60 degrees from the zenith 1.5 and 8 %, with aerosol 3 and 28 % (beside the sun); at
+    88 degrees 3.5 and 30 %, 7 and 100 %; at 96 degrees 9 and 56 %, 11 and 80 %; at 102
+    degrees 30 % and more. From space 1 to 2 %, and 11 to 25 % with suns at 88 degrees
+    and below. Flat slabs of depth 1 are too dark from below, by 3 to 13 % and nowhere
+    by more than 31 %; at depth 2 by 21 % and 49 %, at 4 by 56 % and 89 %: the series
+    adds up light where it first turned, and does not spread it.
 
     Raises `ValueError` where a medium does not depend on altitude alone, where media
     have more edges than there are layers, and where more than an optical depth of 1 is
