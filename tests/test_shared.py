@@ -131,26 +131,31 @@ def test_twice_the_sun_is_twice_the_light():
     np.testing.assert_allclose(looks(double, SHARED), twice, rtol=1e-12)
 
 
+def planet(air, haze, g, ground):
+    """A round world, with two media of so much optical depth, that no sun shines on."""
+    media = (
+        Medium(Exponential(8e3), air / 8e3, phase=Rayleigh()),
+        Medium(Exponential(2e3), haze / 2e3, 1e-6, HenyeyGreenstein(g)),
+    )
+    return Scene(Spherical(6.4e6), 1e5, media, (), ground)
+
+
 def test_gradients_agree_with_differences():
-    start = numbers(0.3, 0.3, 0.5, 0.9, 0.6, 0.3)
+    start = jnp.array([0.3, 0.3, 0.5, 0.3])
 
     @eqx.filter_jit
     def total(x):
-        field = solve(slab(*x), SHARED, NM).prepared
+        field = solve(planet(*x), SHARED, NM).prepared
         return jnp.sum(field.moments) + jnp.sum(field.down)
 
     slope = eqx.filter_jit(jax.grad(total))(start)
-    assert slope[4] == 0.0
-    for i in (0, 1, 2, 3, 5):
-        step = 1e-5 * np.eye(6)[i]
+    for i, step in enumerate(1e-5 * np.eye(4)):
         due = (total(start + step) - total(start - step)) / 2e-5
         assert abs(slope[i] / due - 1.0) < 1e-5, i
 
 
 def test_twilight_fades_and_never_falls_below_nothing():
-    medium = Medium(Exponential(8e3), 1.2e-5, 0.0, Rayleigh())
-    planet = Scene(Spherical(6.4e6), 1e5, (medium,), (), 0.2)
-    field = solve(planet, SHARED, NM).prepared
+    field = solve(planet(*jnp.array([0.1, 0.0, 0.0, 0.2])), SHARED, NM).prepared
     light, zeniths = field.moments[:, :, 0, 0], np.degrees(field.suns.zeniths())
     assert jnp.all(jnp.isfinite(light) & (light >= 0.0))
     sinks = zeniths > 80.0

@@ -65,7 +65,9 @@ def slants(scene: Scene, altitude: Float[Array, "level"]) -> Slants:
 
     def column(altitude, above, cosine):
         start = scene.geometry.locate(jnp.zeros(3, altitude.dtype).at[2].set(altitude))
-        level = jnp.sqrt(jnp.maximum(1.0 - cosine * cosine, 0.0))
+        aside = cosine * cosine < 1.0
+        level = jnp.sqrt(jnp.where(aside, 1.0 - cosine * cosine, 1.0))
+        level = jnp.where(aside, level, 0.0)
         direction = jnp.stack([level, jnp.zeros_like(level), cosine])
         path = scene.geometry.path(start, direction)
         # Not `span`: what grazes the ground may by rounding end there.
