@@ -72,8 +72,7 @@ def away(found, due):
 
 
 def test_without_air_one_sees_the_ground_in_the_sun():
-    scene = Scene(Flat(), DEEP, (), (sun(jnp.array(0.6)),), 0.5)
-    seen = looks(scene, SHARED)
+    seen = looks(slab(*numbers(0.0, cosine=0.6, ground=0.5)), SHARED)
     due = np.where(DOWN, 0.5 / np.pi * 0.6, 0.0)
     np.testing.assert_allclose(seen, np.stack([due, due]), rtol=1e-12)
 
@@ -131,17 +130,14 @@ def test_twice_the_sun_is_twice_the_light():
     np.testing.assert_allclose(looks(double, SHARED), twice, rtol=1e-12)
 
 
-def planet(air, haze, g, ground):
-    """A round world, with two media of so much optical depth, that no sun shines on."""
-    media = (
-        Medium(Exponential(8e3), air / 8e3, phase=Rayleigh()),
-        Medium(Exponential(2e3), haze / 2e3, 1e-6, HenyeyGreenstein(g)),
-    )
-    return Scene(Spherical(6.4e6), 1e5, media, (), ground)
+def planet(depth, g, ground):
+    """A round world whose air is of so much optical depth."""
+    air = Medium(Exponential(8e3), depth / 8e3, 1e-6, HenyeyGreenstein(g))
+    return Scene(Spherical(6.4e6), 1e5, (air,), (), ground)
 
 
 def test_gradients_agree_with_differences():
-    start = jnp.array([0.3, 0.3, 0.5, 0.3])
+    start = jnp.array([0.4, 0.5, 0.3])
 
     @eqx.filter_jit
     def total(x):
@@ -149,13 +145,13 @@ def test_gradients_agree_with_differences():
         return jnp.sum(field.moments) + jnp.sum(field.down)
 
     slope = eqx.filter_jit(jax.grad(total))(start)
-    for i, step in enumerate(1e-5 * np.eye(4)):
+    for i, step in enumerate(1e-5 * np.eye(3)):
         due = (total(start + step) - total(start - step)) / 2e-5
         assert abs(slope[i] / due - 1.0) < 1e-5, i
 
 
 def test_twilight_fades_and_never_falls_below_nothing():
-    field = solve(planet(*jnp.array([0.1, 0.0, 0.0, 0.2])), SHARED, NM).prepared
+    field = solve(planet(*jnp.array([0.1, 0.0, 0.2])), SHARED, NM).prepared
     light, zeniths = field.moments[:, :, 0, 0], np.degrees(field.suns.zeniths())
     assert jnp.all(jnp.isfinite(light) & (light >= 0.0))
     sinks = zeniths > 80.0
