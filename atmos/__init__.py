@@ -1,6 +1,7 @@
 """A physically based spectral sky."""
 
 from . import (
+    bake as bake,
     camera as camera,
     colour as colour,
     geometry as geometry,

@@ -39,6 +39,7 @@ ROOMS = [
     "disk",
     "rays",
     "scenefile",
+    "bake",
     "cli",
 ]
 

@@ -75,7 +75,8 @@ def henyey_greenstein(g, cosine):
 
 
 @pytest.mark.parametrize(
-    "solver, double", [("single", False), ("single", True), ("columns", False)]
+    "solver, double",
+    [("single", False), ("single", True), ("columns", False), ("shared", False)],
 )
 def test_a_thin_slab_is_as_bright_as_its_phase_function(capsys, solver, double):
     command = (

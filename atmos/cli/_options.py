@@ -44,10 +44,18 @@ Output = Annotated[
 ]
 Precise = Annotated[bool, option("Calculate in double precision.")]
 Solver = Annotated[
-    Literal["columns", "single"],
+    Literal["columns", "shared", "single"],
     option(
         "How: columns for all orders of scattering, each column of air taken as flat "
-        "(suns well above the horizon); single for light that turned once."
+        "(suns well above the horizon); shared for all orders, those after the first "
+        "roughly (quick, not for thick air); single for light that turned once."
+    ),
+]
+Bake = Annotated[
+    Path | None,
+    option(
+        "Keep what the solver works out first in this file, or take it from there if "
+        "the file exists; not for --solver single."
     ),
 ]
 Stokes = Annotated[
@@ -281,6 +289,16 @@ def check_output(option: str, path: Path, suffix: str = "") -> None:
         refuse(option, "must be a file that one may replace", path)
     if not os.access(folder, os.W_OK):
         refuse(option, "must lie in a folder that one may write to", path)
+
+
+def check_bake(path: Path | None, solver: str) -> None:
+    """Refuses a file for what a solver does not do, or that could not be written."""
+    if path is None:
+        return
+    if solver == "single":
+        refuse("--bake", "is not for --solver single, which works nothing out first")
+    if not path.exists():
+        check_output("--bake", path)
 
 
 def observed(sun: SunPosition, view: View) -> dict[str, str | float]:

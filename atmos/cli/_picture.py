@@ -1,5 +1,6 @@
 """`atmos sky`: pictures."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
@@ -11,10 +12,20 @@ from ..camera import AbstractCamera, LatLong
 from ..disk import render_disks
 from ..render import render, render_stokes
 from ..scene import Scene
-from ..solver import AbstractSolver
+from ..solver import SolvedSky
 from ._app import app, CAMERA, flat, option, OUTPUT, refuse, SUN, WORLD
 from ._lamp import header, measure_lamp
-from ._options import Files, observed, Solver, Stokes, SunPosition, View, World
+from ._options import (
+    Bake,
+    check_bake,
+    Files,
+    observed,
+    Solver,
+    Stokes,
+    SunPosition,
+    View,
+    World,
+)
 from ._session import progress_bar, start
 from ._world import make_scene, solve_file, solver_named
 
@@ -29,6 +40,7 @@ def sky(
     *,
     solver: Solver = "single",
     stokes: Stokes = 1,
+    bake: Bake = None,
     world: Annotated[World | None, flat(WORLD)] = None,
     sun: Annotated[SunPosition | None, flat(SUN)] = None,
     view: Annotated[View | None, flat(CAMERA)] = None,
@@ -50,31 +62,35 @@ def sky(
     atmos sky --world mars --projection perspective --azimuth 40 --output mars.exr
 
     atmos sky my.toml --no-sun --half --colour-space acescg --solver columns
+
+    atmos sky my.toml --solver columns --bake my.bake --azimuth 90
     """
     world, sun, view = world or World(), sun or SunPosition(), view or View()
     files = files or Files()
     preview = files.check()
+    check_bake(bake, solver)
     start()
 
     wavelength = np.array(files.wavelength, np.float32)
     step = (wavelength[-1] - wavelength[0]) / max(1, wavelength.size - 1) or 10.0
     found = make_scene(scene, world, sun, float(step))
-    said, camera = observed(sun, view), view.camera()
-    how = solver_named(solver, stokes, float(camera.position[2]))
-    write_picture(found, scene, how, camera, wavelength, files, preview, said)
+    camera = view.camera()
+    method = solver_named(solver, stokes, float(camera.position[2]))
+    solved = lambda: solve_file(found, method, wavelength, scene, bake)
+    said = observed(sun, view)
+    write_picture(found, solved, camera, wavelength, files, preview, said)
 
 
 def write_picture(
     scene: Scene,
-    path: Path | None,
-    solver: AbstractSolver,
+    solved: Callable[[], SolvedSky],
     camera: AbstractCamera,
     wavelength: np.ndarray,
     files: Files,
     preview: Path | None,
     observed: dict[str, str | float],
 ) -> None:
-    """Renders a scene and writes what was asked for."""
+    """Renders the sky of a scene and writes what was asked for."""
     spectral = files.colour_space == "spectral"
     space = colour.COLOUR_SPACES["rec709" if spectral else files.colour_space]
     seen = not spectral or (
@@ -83,23 +99,23 @@ def write_picture(
     bands = jnp.asarray(wavelength)
     weights = colour.response(bands) if seen else None
     response = None if spectral else space.from_xyz(weights)
-    sky = solve_file(scene, solver, bands, path)
 
     # First what may be refused.
+    sky = solved()
     disks = render_disks(sky, camera, response) if files.sun else np.zeros(1)
     if files.half and np.max(disks) > _LARGEST_HALF:
         rule = "cannot hold the sun's disk; leave it to a lamp with --no-sun"
         refuse("--half", rule, f"{np.max(disks):g}")
     lamps = [measure_lamp(sky, x, camera, space, weights) for x in sky.scene.lights]
-    look = render if solver.stokes == 1 else render_stokes
+    look = render if sky.solver.stokes == 1 else render_stokes
     with progress_bar("sky") as tell:
         picture = np.asarray(look(sky, camera, response, progress=tell))
     polarised = None
-    if solver.stokes == 3:
+    if sky.solver.stokes == 3:
         picture, polarised = picture[0], picture[1:]
     picture = picture + disks.astype(picture.dtype)
 
-    said = header(scene, solver, wavelength, lamps) | observed
+    said = header(scene, sky.solver, wavelength, lamps) | observed
     latlong = isinstance(camera, LatLong)
     kind = {
         "stokes": polarised,

@@ -20,9 +20,12 @@ from ..rays import (
     radiances,
 )
 from ..scenefile import load
+from ..solver import SolvedSky
 from ._app import app, numbers_option, refuse
 from ._options import (
     Altitudes,
+    Bake,
+    check_bake,
     check_output,
     File,
     Output,
@@ -54,6 +57,7 @@ def radiance(
         numbers_option("View azimuths relative to the sun's, in degrees.", -360, 360),
     ] = (0.0,),
     wavelength: Wavelengths = (450.0, 550.0, 650.0),
+    bake: Bake = None,
     output: Output = None,
     float64: Precise = False,
 ) -> None:
@@ -71,6 +75,7 @@ def radiance(
     """
     if output is not None:
         check_output("--output", output)
+    check_bake(bake, solver)
     start(float64)
 
     found = load(scene)
@@ -78,14 +83,24 @@ def radiance(
         refuse("sun", "must be one alone", f"{len(found.lights)} in '{scene}'")
     own, towards = angles(np.asarray(found.lights[0].direction))
     suns = (own,) if sun_zenith is None else sun_zenith
+    method = solver_named(solver, stokes)
+    each = bool(method.baked(found).lights)  # solved for each sun
+    if bake is not None and len(suns) > 1 and each:
+        refuse("--bake", f"serves one sun with --solver {solver}", len(suns))
     bands = padded(np.array(wavelength, np.float64 if float64 else np.float32))
     axes = [np.array(x) for x in (altitude, view_zenith, azimuth)]
 
-    def blocks() -> Iterator[tuple[Sequence[Any], Any]]:
+    def skies() -> Iterator[SolvedSky]:
+        sky = None
         for zenith in suns:
             light = direction(zenith, towards).astype(bands.dtype)
-            lit = eqx.tree_at(lambda x: x.lights[0].direction, found, light)
-            sky = solve_file(lit, solver_named(solver, stokes), bands, scene)
+            if sky is None or each:
+                lit = eqx.tree_at(lambda x: x.lights[0].direction, found, light)
+                sky = solve_file(lit, method, bands, scene, bake)
+            yield eqx.tree_at(lambda x: x.scene.lights[0].direction, sky, light)
+
+    def blocks() -> Iterator[tuple[Sequence[Any], Any]]:
+        for zenith, sky in zip(suns, skies(), strict=True):
             for height, tilt, turn in combinations(sky, *axes):
                 values = look(sky, height, direction(tilt, towards + turn))
                 yield (np.full(height.shape, zenith), height, tilt, turn), values

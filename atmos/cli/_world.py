@@ -8,6 +8,7 @@ from pathlib import Path
 import equinox as eqx
 from jaxtyping import ArrayLike
 
+from .. import bake
 from ..light import SOLAR_RADIUS, Sun, sunlight
 from ..particle.surface import albedo
 from ..quantity import km
@@ -18,6 +19,7 @@ from ..solver import (
     AbstractSolver,
     Columns,
     QUICK,
+    Shared,
     SingleScattering,
     solve,
     SolvedSky,
@@ -119,15 +121,31 @@ def solver_named(
     single = QUICK if quick else SingleScattering()
     if name == "columns":
         return Columns(single=single, stokes=stokes)
+    if name == "shared":
+        if stokes != 1:
+            refuse("--stokes", "must be 1 with --solver shared", stokes)
+        return Shared(single=single)
     return dataclasses.replace(single, stokes=stokes)
 
 
 def solve_file(
-    scene: Scene, solver: AbstractSolver, bands: ArrayLike, path: Path | None
+    scene: Scene,
+    solver: AbstractSolver,
+    bands: ArrayLike,
+    path: Path | None,
+    kept: Path | None = None,
 ) -> SolvedSky:
-    """The sky of a scene; errors about a scene that was read name its file and keys."""
+    """The sky of a scene; errors about a scene that was read name its file and keys.
+
+    With `kept`, from that file if there is one; else there will be.
+    """
     try:
-        return solve(scene, solver, bands)
+        if kept is not None and kept.exists():
+            return bake.load(kept, scene, solver, bands)
+        sky = solve(scene, solver, bands)
+        if kept is not None:
+            bake.save(sky, kept)
+        return sky
     except ValueError as error:
         if path is None:
             raise

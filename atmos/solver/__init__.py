@@ -1,5 +1,6 @@
 from ._base import (
     AbstractSolver as AbstractSolver,
+    admit as admit,
     solve as solve,
     SolvedSky as SolvedSky,
 )
@@ -10,4 +11,5 @@ from .path_tracing import (
     PathTracing as PathTracing,
     Tally as Tally,
 )
+from .shared import Shared as Shared
 from .single_scattering import QUICK as QUICK, SingleScattering as SingleScattering

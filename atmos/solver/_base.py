@@ -36,8 +36,20 @@ class AbstractSolver(eqx.Module):
     around: ClassVar[int]
     stokes: eqx.AbstractVar[int]
 
-    def check(self, scene: Scene) -> None:
-        """Raises `ValueError` for a scene that the method does not hold for."""
+    def check(self, scene: Scene, wavelength: Wavelength) -> Scene:
+        """The scene, if the method holds for it; raises `ValueError` otherwise.
+
+        Where that hangs on numbers yet to be traced, what is made of the scene raises
+        when it is run.
+        """
+        return scene
+
+    def baked(self, scene: Scene) -> Scene:
+        """All of a scene that `prepare` is told: less than the whole if that will do.
+
+        What was worked out then serves every scene that differs in the rest alone.
+        """
+        return scene
 
     @abc.abstractmethod
     def prepare(self, scene: Scene, wavelength: Wavelength) -> PyTree[Any]:
@@ -246,6 +258,15 @@ def solve(scene: Scene, solver: AbstractSolver, wavelength: ArrayLike) -> Solved
     wavelengths are one-dimensional, lie between 100 nm and 100 um, and every table of
     the scene covers them; and for a scene that the solver does not hold for.
     """
+    scene, nm = admit(scene, solver, wavelength)
+    prepared = _prepare(solver, solver.baked(scene), nm)
+    return SolvedSky(scene=scene, solver=solver, wavelength=nm, prepared=prepared)
+
+
+def admit(
+    scene: Scene, solver: AbstractSolver, wavelength: ArrayLike
+) -> tuple[Scene, Wavelength]:
+    """A scene and wavelengths as a solver is told them, or the errors of `solve`."""
     nm = as_float(wavelength)
     if nm.ndim != 1:
         raise ValueError(f"`wavelength` must be one-dimensional; got shape {nm.shape}.")
@@ -254,10 +275,8 @@ def solve(scene: Scene, solver: AbstractSolver, wavelength: ArrayLike) -> Solved
         nm = eqx.error_if(nm, ~known, "`wavelength` must lie between 100 and 1e5 nm.")
     else:
         _check_wavelength(scene, np.asarray(nm))
-    solver.check(scene)
     scene = jax.tree.map(lambda x: x.astype(nm.dtype), scene)
-    prepared = _prepare(solver, scene, nm)
-    return SolvedSky(scene=scene, solver=solver, wavelength=nm, prepared=prepared)
+    return solver.check(scene, nm), nm
 
 
 @eqx.filter_jit

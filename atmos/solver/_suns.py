@@ -1,6 +1,7 @@
 """The suns for which diffuse light is worked out."""
 
 import abc
+import math
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -37,6 +38,37 @@ class FlatSuns(AbstractSuns):
         self, light: Sun, zenith: Angle
     ) -> tuple[Int[Array, "1"], Float[Array, "1"]]:
         return _nearest(self.lights, light)[None], jnp.ones_like(zenith)[None]
+
+
+class EverySun(AbstractSuns):
+    """The zenith angles from 0 to `last`, for suns that stand anywhere.
+
+    They crowd where the sun sets, and are joined by straight lines, which never fall
+    below what they join.
+    """
+
+    last: Angle
+    count: int = eqx.field(static=True)
+
+    def _ends(self) -> tuple[float, Array]:
+        high = jnp.arcsinh((self.last - 0.5 * math.pi) / _CLOSE)
+        return math.asinh(-0.5 * math.pi / _CLOSE), high
+
+    def zeniths(self) -> Float[Array, "sun"]:
+        low, high = self._ends()
+        t = jnp.linspace(0.0, 1.0, self.count, dtype=self.last.dtype)
+        found = 0.5 * math.pi + _CLOSE * jnp.sinh(low + (high - low) * t)
+        return jnp.clip(found, 0.0, self.last)
+
+    def between(
+        self, light: Sun, zenith: Angle
+    ) -> tuple[Int[Array, "2"], Float[Array, "2"]]:
+        low, high = self._ends()
+        t = jnp.arcsinh((jnp.minimum(zenith, self.last) - 0.5 * math.pi) / _CLOSE)
+        t = jnp.clip((t - low) / (high - low), 0.0, 1.0) * (self.count - 1)
+        first = jnp.clip(jnp.floor(stop_gradient(t)), 0.0, self.count - 2.0)
+        weights = jnp.stack([1.0 - (t - first), t - first])
+        return first.astype(jnp.int32) + jnp.arange(2, dtype=jnp.int32), weights
 
 
 # The distance from a light's zenith angle within which others lie evenly.

@@ -68,10 +68,10 @@ class Columns(AbstractSolver):
                 f"`streams` must be at least 4 where `stokes` is 3; got {self.streams}."
             )
 
-    def check(self, scene: Scene) -> None:
+    def check(self, scene: Scene, wavelength: Wavelength) -> Scene:
         check_layered(scene)
         if isinstance(scene.geometry, Flat):
-            return
+            return scene
         for i, light in enumerate(scene.lights):
             zenith = light.zenith
             if not isinstance(zenith, Tracer) and zenith > _LOWEST:
@@ -80,6 +80,7 @@ class Columns(AbstractSolver):
                     "higher, for columns in a round world; got "
                     f"{90.0 - float(zenith) / deg:.6g}."
                 )
+        return scene
 
     def prepare(self, scene: Scene, wavelength: Wavelength) -> Field:
         mixed = mixture(scene, wavelength, self.streams + 1, self.stokes).truncated()

@@ -74,8 +74,9 @@ class PathTracing(AbstractSolver):
                     f"`{name}` must be at least {least}; got {getattr(self, name)}."
                 )
 
-    def check(self, scene: Scene) -> None:
+    def check(self, scene: Scene, wavelength: Wavelength) -> Scene:
         check_layered(scene)
+        return scene
 
     def prepare(self, scene: Scene, wavelength: Wavelength) -> Layers:
         return prepare(scene, wavelength)

@@ -1,0 +1,180 @@
+"""Orders of scattering that share one field: its laws, and against all orders."""
+
+import math
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from atmos.geometry import Flat, Spherical
+from atmos.light import Sun
+from atmos.medium import Ball, Exponential, Medium, Uniform
+from atmos.optics import mixture
+from atmos.phase import HenyeyGreenstein, Rayleigh
+from atmos.scene import Scene
+from atmos.solver import Columns, Shared, SingleScattering, solve
+from atmos.solver._second import turns
+
+
+NM = np.array([500.0])
+DEEP = 1000.0
+SHARED = Shared(layers=8)
+ONCE = SingleScattering()
+
+
+def sun(cosine, irradiance=1.0):
+    level = jnp.sqrt(1.0 - cosine**2)
+    return Sun(jnp.stack([level, 0.0 * cosine, cosine]), irradiance, 0.0)
+
+
+def slab(air, haze, g, albedo, cosine, ground):
+    """Two media in each other's place, of so much optical depth."""
+    fills, both = Uniform(0.0, DEEP), []
+    for depth, phase in ((air, Rayleigh()), (haze, HenyeyGreenstein(g))):
+        scattered, absorbed = depth * albedo / DEEP, depth * (1.0 - albedo) / DEEP
+        both.append(Medium(fills, scattered, absorbed, phase))
+    return Scene(Flat(), DEEP, tuple(both), (sun(cosine),), ground)
+
+
+COSINES = np.array([-1.0, -0.7, -0.3, -0.1, 0.1, 0.3, 0.7, 1.0])
+AZIMUTHS = np.array([0.3, 1.1, 2.0, 3.0])
+LEVEL = np.sqrt(1.0 - COSINES**2)[:, None]
+VIEWS = np.stack(
+    [
+        LEVEL * np.cos(AZIMUTHS),
+        LEVEL * np.sin(AZIMUTHS),
+        COSINES[:, None] + 0.0 * AZIMUTHS,
+    ],
+    -1,
+).reshape(-1, 3)
+UP, DOWN = VIEWS[:, 2] > 0.0, VIEWS[:, 2] < 0.0
+
+
+@eqx.filter_jit
+def looks(scene, solver):
+    """From the ground and from the top, in every direction."""
+    sky = solve(scene, solver, NM)
+    at = jnp.array([[0.0, 0.0, 0.0], [0.0, 0.0, DEEP]])
+    see = jax.vmap(jax.vmap(sky.radiance, (None, 0)), (0, None))
+    return see(at, VIEWS)[..., 0]
+
+
+def numbers(air=0.0, haze=0.0, g=0.0, albedo=1.0, cosine=0.87, ground=0.0):
+    return jnp.array([air, haze, g, albedo, cosine, ground])
+
+
+def away(found, due):
+    """Relative differences of what one sees, but for the ground and the black sky."""
+    off = found / due - 1.0
+    return np.concatenate([off[0][UP], off[1][DOWN]])
+
+
+def test_without_air_one_sees_the_ground_in_the_sun():
+    seen = looks(slab(*numbers(0.0, cosine=0.6, ground=0.5)), SHARED)
+    due = np.where(DOWN, 0.5 / np.pi * 0.6, 0.0)
+    np.testing.assert_allclose(seen, np.stack([due, due]), rtol=1e-12)
+
+
+@pytest.mark.parametrize("depth", [1e-4, 1e-6])
+def test_thin_media_scatter_once(depth):
+    scene = slab(*numbers(depth, 2.0 * depth, 0.7))
+    off = away(looks(scene, SHARED), looks(scene, ONCE))
+    assert 0.0 < np.max(off) < 30.0 * depth
+
+
+@pytest.mark.parametrize("depth", [0.01, 0.1, 1.0, 10.0])
+def test_a_white_medium_turns_just_the_light_that_it_does_not_let_through(depth):
+    scene, nm = slab(*numbers(depth)), jnp.asarray(NM)
+    altitude, zeniths = jnp.linspace(0.0, DEEP, 5), jnp.array([0.0, 1.0])
+    mixed, black = mixture(scene, nm, 1), jnp.zeros(1)
+    found = eqx.filter_jit(turns)(scene, mixed, black, altitude, zeniths)
+    way = np.where(found.cosine > 0.0, DEEP - altitude[:, None], altitude[:, None])
+    passed = np.exp(-depth * way / DEEP / np.abs(found.cosine))
+    np.testing.assert_allclose(found.again[..., 0], 1.0 - passed, atol=1e-12)
+    np.testing.assert_allclose(jnp.sum(found.weight, 1), 1.0, rtol=1e-12)
+    share = found.mean(found.again)
+    assert jnp.all((share > 0.0) & (share < 1.0))
+
+
+def test_of_what_absorbs_less_comes_back():
+    def more(albedo):
+        scene = slab(*numbers(0.5, 0.3, albedo=albedo))
+        return looks(scene, SHARED)[0][UP] / looks(scene, ONCE)[0][UP]
+
+    assert np.all((more(0.4) > 1.0) & (more(0.4) < more(0.8)))
+
+
+@pytest.mark.parametrize(
+    "scene, mean, most",
+    [
+        (numbers(0.1), 0.01, 0.025),
+        (numbers(0.3, cosine=0.3), 0.03, 0.05),
+        (numbers(0.3, ground=0.8), 0.03, 0.05),
+        (numbers(1.0), 0.05, 0.17),
+        (numbers(0.1, 0.1, 0.7, ground=0.2), 0.03, 0.06),
+        (numbers(0.1, 0.4, 0.7, 0.9, ground=0.2), 0.06, 0.17),
+    ],
+)
+def test_slabs_are_nearly_as_bright_as_by_discrete_ordinates(scene, mean, most):
+    scene = slab(*scene)
+    off = np.abs(away(looks(scene, SHARED), looks(scene, Columns(layers=12))))
+    assert off.mean() < mean and off.max() < most
+
+
+def test_twice_the_sun_is_twice_the_light():
+    scene = slab(*numbers(0.3, 0.3, 0.7, 0.9, ground=0.3))
+    double = eqx.tree_at(lambda x: x.lights, scene, (sun(jnp.array(0.87), 2.0),))
+    twice = 2.0 * looks(scene, SHARED)
+    np.testing.assert_allclose(looks(double, SHARED), twice, rtol=1e-12)
+
+
+def planet(depth, g, ground):
+    """A round world whose air is of so much optical depth."""
+    air = Medium(Exponential(8e3), depth / 8e3, 1e-6, HenyeyGreenstein(g))
+    return Scene(Spherical(6.4e6), 1e5, (air,), (), ground)
+
+
+def test_gradients_agree_with_differences():
+    start = jnp.array([0.4, 0.5, 0.3])
+
+    @eqx.filter_jit
+    def total(x):
+        field = solve(planet(*x), SHARED, NM).prepared
+        return jnp.sum(field.moments) + jnp.sum(field.down)
+
+    slope = eqx.filter_jit(jax.grad(total))(start)
+    for i, step in enumerate(1e-5 * np.eye(3)):
+        due = (total(start + step) - total(start - step)) / 2e-5
+        assert abs(slope[i] / due - 1.0) < 1e-5, i
+
+
+def test_twilight_fades_and_never_falls_below_nothing():
+    field = solve(planet(*jnp.array([0.1, 0.0, 0.2])), SHARED, NM).prepared
+    light, zeniths = field.moments[:, :, 0, 0], np.degrees(field.suns.zeniths())
+    assert jnp.all(jnp.isfinite(light) & (light >= 0.0))
+    sinks = zeniths > 80.0
+    assert np.all(np.diff(light[:, 0])[sinks[1:]] <= 0.0)
+    # Twice the dip of the horizon from the top, beyond which nothing is seen lit.
+    assert zeniths[-1] == pytest.approx(90.0 + 2.0 * np.degrees(np.arccos(64 / 65)))
+    assert light[-1, 0] < 1e-15 * light[0, 0]
+
+
+def test_what_is_too_thick_is_refused():
+    solve(slab(*numbers(0.99)), SHARED, NM)
+    # Without a peak of half of it, and where most absorbs, there is less to turn.
+    solve(slab(*numbers(haze=1.9, g=math.sqrt(0.5))), SHARED, NM)
+    solve(slab(*numbers(9.0, albedo=0.1)), SHARED, NM)
+    thick = slab(*numbers(1.02))
+    with pytest.raises(ValueError, match="scene.media. must not scatter .* got 1.02"):
+        solve(thick, SHARED, NM)
+    with pytest.raises(RuntimeError, match="scene.media. must not scatter"):
+        jax.block_until_ready(looks(thick, SHARED))
+
+
+def test_media_that_change_sideways_are_refused():
+    ball = Medium(Ball(np.array([0.0, 0.0, 1.0]), 1.0), 1.0)
+    scene = eqx.tree_at(lambda x: x.media, slab(*numbers(0.1)), (ball,))
+    with pytest.raises(ValueError, match="media.0..profile. must depend on altitude"):
+        solve(scene, SHARED, NM)
