@@ -44,11 +44,12 @@ Output = Annotated[
 ]
 Precise = Annotated[bool, option("Calculate in double precision.")]
 Solver = Annotated[
-    Literal["columns", "shared", "single"],
+    Literal["shells", "columns", "shared", "single"],
     option(
-        "How: columns for all orders of scattering, each column of air taken as flat "
-        "(suns well above the horizon); shared for all orders, those after the first "
-        "roughly (quick, not for thick air); single for light that turned once."
+        "How: shells for all orders of scattering in the round, for any sun; columns "
+        "for all orders, each column of air taken as flat (suns well above the "
+        "horizon); shared for all orders, those after the first roughly (quick, not "
+        "for thick air); single for light that turned once."
     ),
 ]
 Bake = Annotated[

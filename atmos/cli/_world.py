@@ -20,6 +20,7 @@ from ..solver import (
     Columns,
     QUICK,
     Shared,
+    Shells,
     SingleScattering,
     solve,
     SolvedSky,
@@ -121,10 +122,11 @@ def solver_named(
     single = QUICK if quick else SingleScattering()
     if name == "columns":
         return Columns(single=single, stokes=stokes)
-    if name == "shared":
+    more = {"shared": Shared, "shells": Shells}
+    if name in more:
         if stokes != 1:
-            refuse("--stokes", "must be 1 with --solver shared", stokes)
-        return Shared(single=single)
+            refuse("--stokes", f"must be 1 with --solver {name}", stokes)
+        return more[name](single=single)
     return dataclasses.replace(single, stokes=stokes)
 
 

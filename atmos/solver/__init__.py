@@ -12,4 +12,5 @@ from .path_tracing import (
     Tally as Tally,
 )
 from .shared import Shared as Shared
+from .shells import Shells as Shells
 from .single_scattering import QUICK as QUICK, SingleScattering as SingleScattering

@@ -5,12 +5,12 @@ import math
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 
 from ..geometry import Point
 from ..light import Sun
 from ..optics import Mixture
-from ..quantity import Depth, Direction, Position, Wavelength
+from ..quantity import Depth, Direction, Length, Position, Wavelength
 from ..scene import Scene
 from ..transport import contract, cumulative, densities, enter, gauss_legendre
 from ._harmonics import harmonics, pairs
@@ -33,20 +33,22 @@ class Field(eqx.Module):
     moments: Float[Array, "sun level pair wl"]
     up: Float[Array, "sun level wl"]
     down: Float[Array, "sun level wl"]
+    reference: Float[Array, "sun level"]
     stokes: int = eqx.field(static=True, default=1)
 
     def _look(self, table: Array, light: Sun, point: Point) -> Array:
-        """A table at a place, by straight lines in altitude."""
-        i = jnp.searchsorted(self.altitude, point.altitude, side="right") - 1
-        i = jnp.clip(i, 0, len(self.altitude) - 2)
-        step = self.altitude[i + 1] - self.altitude[i]
-        x = (point.altitude - self.altitude[i]) / jnp.where(step > 0.0, step, 1.0)
-        x = jnp.clip(x, 0.0, 1.0)
+        """A table at a place, by cubics in altitude and between suns."""
+        levels, by_level = _between(self.altitude, point.altitude)
         zenith = zenith_angle(point.up, light.direction)
+        suns, by_sun = self.suns.between(light, zenith)
+        weights = by_sun[:, None] * by_level[None]
+        brightness = self.reference[suns][:, levels]
+        scale = jnp.exp(jnp.sum(weights * brightness))
         mixed = jnp.zeros_like(table[0, 0])
-        for sun, weight in zip(*self.suns.between(light, zenith), strict=True):
-            mixed += weight * ((1.0 - x) * table[sun, i] + x * table[sun, i + 1])
-        return mixed
+        for i, sun in enumerate(suns):
+            for j, level in enumerate(levels):
+                mixed += weights[i, j] * table[sun, level]
+        return scale * mixed
 
     def fluxes(self, light: Sun, point: Point) -> tuple[Depth, Depth]:
         """Diffuse flux upwards and downwards, for a light of irradiance 1."""
@@ -130,6 +132,41 @@ class Field(eqx.Module):
         radiance, *rest = (jnp.sum(x, 0) for x in seen)
         total = [radiance + jnp.where(grounded, ground, 0.0), *rest]
         return jnp.stack(total) * light.irradiance.evaluate(wavelength)[None]
+
+
+def _between(
+    altitude: Float[Array, "level"], here: Length
+) -> tuple[Int[Array, "4"], Float[Array, "4"]]:
+    """Which levels to mix at an altitude, and how much of each.
+
+    A cubic between two levels whose slope at either is that of the parabola through it
+    and its neighbours (Catmull and Rom 1974, for uneven steps); a straight line's at
+    the ends.
+    """
+    last = len(altitude) - 1
+    i = jnp.searchsorted(altitude, here, side="right") - 1
+    i = jnp.clip(i, 0, last - 1).astype(jnp.int32)
+    levels = jnp.stack([jnp.maximum(i - 1, 0), i, i + 1, jnp.minimum(i + 2, last)])
+    before, step, after = jnp.diff(altitude[levels])
+    x = jnp.clip((here - altitude[i]) / jnp.where(step > 0.0, step, 1.0), 0.0, 1.0)
+
+    def slope(side):
+        """What the value at the level itself, and that beyond it, add to the slope."""
+        known = side > 0.0
+        ratio = step / jnp.where(known, side, 1.0)
+        beyond = jnp.where(known, ratio * ratio / (1.0 + ratio), 0.0)
+        return beyond, jnp.where(known, 1.0 / (1.0 + ratio), 1.0)
+
+    (a, b), (c, d) = slope(before), slope(after)
+    low, high = x * (1.0 - x) ** 2, x * x * (x - 1.0)
+    rise = x * x * (3.0 - 2.0 * x)
+    weights = [
+        -a * low,
+        1.0 - rise + low * (a - b) - high * d,
+        rise + low * b + high * (d - c),
+        high * c,
+    ]
+    return levels, jnp.stack(weights)
 
 
 def _cosines(

@@ -100,16 +100,31 @@ class RoundSuns(AbstractSuns):
     def between(
         self, light: Sun, zenith: Angle
     ) -> tuple[Int[Array, "4"], Float[Array, "4"]]:
-        which = _nearest(self.lights, light)
+        first, x = self.place(zenith, _nearest(self.lights, light))
+        return first + jnp.arange(4, dtype=jnp.int32), cubic(x)
+
+    def place(
+        self, zenith: Float[Array, "*n"], which: Int[Array, ""] | int = 0
+    ) -> tuple[Int[Array, "*n"], Float[Array, "*n"]]:
+        """The first of the four to mix, and how many steps from it a light stands."""
         centre, low, high = (x[which] for x in self._ends())
         t = jnp.arcsinh((jnp.clip(zenith, 0.0, self.last) - centre) / _CLOSE)
         t = (t - low) / (high - low) * (self.count - 1)
         first = jnp.clip(jnp.floor(stop_gradient(t)) - 1.0, 0.0, self.count - 4.0)
-        x = t - first
-        a, b, c = x - 1.0, x - 2.0, x - 3.0
-        weights = [-a * b * c / 6.0, x * b * c / 2.0, -x * a * c / 2.0, x * a * b / 6.0]
-        first = first.astype(jnp.int32) + which * self.count
-        return first + jnp.arange(4, dtype=jnp.int32), jnp.stack(weights)
+        return first.astype(jnp.int32) + which * self.count, t - first
+
+
+def cubic(x: Float[Array, "*n"]) -> Float[Array, "*n 4"]:
+    """Weights of the places 0 to 3 for a cubic through them."""
+    a, b, c = x - 1.0, x - 2.0, x - 3.0
+    weights = [-a * b * c / 6.0, x * b * c / 2.0, -x * a * c / 2.0, x * a * b / 6.0]
+    return jnp.stack(weights, -1)
+
+
+def straight(x: Float[Array, "*n"]) -> Float[Array, "*n 4"]:
+    """Weights of the places 0 to 3 for straight lines between them."""
+    near = [jnp.maximum(1.0 - jnp.abs(x - i), 0.0) for i in range(4)]
+    return jnp.stack(near, -1)
 
 
 def _nearest(lights: Float[Array, "light"], light: Sun) -> Int[Array, ""]:

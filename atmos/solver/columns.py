@@ -114,6 +114,7 @@ class Columns(AbstractSolver):
             turned(light.moments),
             turned(light.up),
             turned(light.down),
+            jnp.zeros((len(zeniths), len(cut.altitude)), wavelength.dtype),
             self.stokes,
         )
 

@@ -97,6 +97,7 @@ class Shared(AbstractSolver):
             by_sun(2.0 * light)[:, :, None],
             by_sun(found.flux(whole, -1.0)),
             by_sun(found.flux(whole, 1.0)),
+            jnp.zeros((self.suns, len(altitude)), wavelength.dtype),
         )
 
     def scattered(

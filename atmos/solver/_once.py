@@ -1,0 +1,102 @@
+"""Light of the sun that turns once on its way from level to level."""
+
+import math
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float, Int
+
+from ..geometry import Point
+from ..optics import Mixture
+from ..scene import Scene
+from ..transport import contract, gauss_legendre
+from ._rays import above, Rays, Steps
+from ._sunlight import Sunlight
+
+
+# Places a step.
+_NODES = 3
+
+
+class Once(eqx.Module):
+    """What a sun of irradiance 1 adds to light on its steps, with exact shadows."""
+
+    scene: Scene
+    mixture: Mixture
+    rays: Rays
+    sunlight: Sunlight
+    zenith: Float[Array, "sun"]
+    azimuth: Float[Array, "azimuth"]
+
+    def ground(self) -> Float[Array, "sun wl"]:
+        """What of it reaches the ground without a turn, on a square metre."""
+        rise = jnp.cos(self.zenith)
+        up = rise > 0.0
+        ahead = self.sunlight.radius * jnp.where(up, rise, 1.0)
+        column = self.sunlight.columns(jnp.zeros_like(rise), ahead)
+        direct = jnp.exp(-contract("sm,ml->sl", column, self.mixture.extinction))
+        return jnp.where(up, rise, 0.0)[:, None] * direct
+
+    def rising(self, layer: Int[Array, ""]) -> Float[Array, "ray azimuth sun wl"]:
+        """In views upwards from the lower level of a layer."""
+        return self._turned(layer, layer, self.rays.up, 1.0)
+
+    def falling(self, layer: Int[Array, ""]) -> Float[Array, "ray azimuth sun wl"]:
+        """In views downwards from the upper level of a layer."""
+        return self._turned(layer + 1, layer, self.rays.down, -1.0)
+
+    def _turned(self, level, layer, steps: Steps, sign: float):
+        altitude = self.rays.altitude[level]
+        radius = self.sunlight.radius + altitude
+        up = jnp.zeros(3, altitude.dtype).at[2].set(1.0)
+        start = Point(altitude * up, altitude, up)
+        u, w = (jnp.asarray(x, altitude.dtype) for x in gauss_legendre(_NODES))
+        here = above(self.scene, altitude)
+
+        def one(cosine, ahead, length, azimuth, zenith):
+            flat = jnp.sqrt(jnp.maximum(1.0 - cosine * cosine, 0.0))
+            level = flat * jnp.cos(azimuth), flat * jnp.sin(azimuth)
+            view = jnp.stack([*level, sign * cosine])
+            zero, rises = jnp.zeros_like(zenith), jnp.cos(zenith)
+            sun = jnp.stack([jnp.sin(zenith), zero, rises])
+            path = self.scene.geometry.path(start, view)
+            begins, ends = jnp.clip(path.shadow(sun, zero), 0.0, length)
+            lit = length - (ends - begins)
+            along = lit * u
+            along = jnp.where(along < begins, along, along + (ends - begins))
+            q = along * (along + 2.0 * sign * ahead)
+            rise = q / (jnp.sqrt(jnp.maximum(radius * radius + q, 0.0)) + radius)
+            height = jnp.maximum(altitude + rise, 0.0)
+            turn = jnp.dot(view, sun)
+            past = self.sunlight.columns(height, radius * rises + along * turn)
+            density = jax.vmap(lambda x: above(self.scene, x))(height)
+            past += (0.5 * along)[:, None] * (density + here[None])
+            return lit * w, density, past, turn
+
+        over = jax.vmap(one, (None, None, None, None, 0))
+        over = jax.vmap(over, (None, None, None, 0, None))
+        over = jax.vmap(over, (0, 0, 0, None, None))
+        cosine, ahead = self.rays.cosine[level], self.rays.ahead[level]
+        share, density, past, turn = over(
+            cosine, ahead, steps.length[layer], self.azimuth, self.zenith
+        )
+        lost = lambda x: contract("kasm,ml->kasl", x, self.mixture.extinction)
+        arrives = [jnp.exp(-lost(past[..., n, :])) for n in range(_NODES)]
+        basis = _legendre(turn, self.mixture.scattering.shape[1])
+        total = jnp.zeros_like(arrives[0])
+        for m, scattering in enumerate(self.mixture.scattering):
+            seen = jnp.zeros_like(total)
+            for n, arrived in enumerate(arrives):
+                seen += (share[..., n] * density[..., n, m])[..., None] * arrived
+            total += contract("kasj,jw->kasw", basis, scattering) * seen
+        return total
+
+
+def _legendre(cosine: Float[Array, "*n"], count: int) -> Float[Array, "*n l"]:
+    """What moments weigh in a phase function at the cosine of a turn."""
+    rows = [jnp.ones_like(cosine), cosine]
+    for l in range(2, count):
+        rows.append(((2 * l - 1) * cosine * rows[-1] - (l - 1) * rows[-2]) / l)
+    rows = [x * ((2 * l + 1) / (4.0 * math.pi)) for l, x in enumerate(rows[:count])]
+    return jnp.stack(rows, -1)

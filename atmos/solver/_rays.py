@@ -1,0 +1,174 @@
+"""Lines through round air, cut at its levels: the same for all places and suns."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from ..geometry import Spherical
+from ..optics import Layers
+from ..quantity import Length
+from ..scene import Scene
+from ..transport import contract, densities, gauss_legendre
+
+
+class Steps(eqx.Module):
+    """Ways from a level to the next one, along each line.
+
+    `angle` is that between the verticals at both ends, and `column` how many metres of
+    density 1 of each medium lie between.
+    """
+
+    length: Float[Array, "layer ray"]
+    angle: Float[Array, "layer ray"]
+    column: Float[Array, "layer ray medium"]
+
+
+class Rays(eqx.Module):
+    """Straight lines that pass the planet's centre at various distances.
+
+    The first lines meet the ground, at Gauss's and Legendre's cosines; of the others,
+    the limb, each turns round in the middle of one layer, the lowest first. `ahead` is
+    the distance from a line's lowest place to each level; 0 where it never gets there.
+    At each level `weight` adds up integrals over the cosine of the zenith angle from 0
+    to 1.
+    """
+
+    altitude: Float[Array, "level"]
+    ahead: Float[Array, "level ray"]
+    cosine: Float[Array, "level ray"]
+    weight: Float[Array, "level ray"]
+    up: Steps  # from the lower level to the upper one
+    down: Steps  # from the upper level to the lower one, or through the lowest place
+    grounded: int = eqx.field(static=True)
+
+
+def rays(scene: Scene, cut: Layers, grounded: int) -> Rays:
+    """Lines through a round world, of which so many meet the ground."""
+    altitude, radius = cut.altitude, radius_of(scene)
+    layers = altitude.shape[0] - 1
+    x, w = (jnp.asarray(x, altitude.dtype) for x in gauss_legendre(grounded))
+    low = 0.5 * (altitude[:-1] + altitude[1:])
+
+    h = altitude[:, None]
+    below = low[None]
+    inner = jnp.sqrt((radius * x[None]) ** 2 + h * (h + 2.0 * radius))
+    squared = (h - below) * (h + below + 2.0 * radius)
+    over = squared > 0.0
+    outer = jnp.where(over, jnp.sqrt(jnp.where(over, squared, 1.0)), 0.0)
+    ahead = jnp.concatenate([inner, outer], 1)
+    nearest = jnp.concatenate([radius * jnp.sqrt((1.0 - x) * (1.0 + x)), radius + low])
+    cosine = ahead / (radius + h)
+    horizon = jnp.sqrt(h * (h + 2.0 * radius)) / (radius + h)
+    inner = (radius / (radius + h)) ** 2 * (x * w)[None] / cosine[:, :grounded]
+    plain = jnp.concatenate([inner, _limb(cosine[:, grounded:], horizon)], 1)
+
+    begin, end = ahead[:-1], ahead[1:]
+    chord = (h[1:] - h[:-1]) * (h[1:] + h[:-1] + 2.0 * radius)
+    passes = begin > 0.0
+    straight = jnp.where(passes, chord / jnp.where(passes, begin + end, 1.0), 0.0)
+    turns = np.eye(layers, grounded + layers, grounded, dtype=bool)
+    through = jnp.where(turns, 2.0 * end, straight)
+    return Rays(
+        altitude,
+        ahead,
+        cosine,
+        _mended(cosine, plain),
+        _steps(scene, altitude[1:], end, nearest, straight),
+        _steps(scene, altitude[1:], end, nearest, through),
+        grounded,
+    )
+
+
+def _steps(
+    scene: Scene,
+    altitude: Float[Array, "layer"],
+    ahead: Float[Array, "layer ray"],
+    nearest: Float[Array, "ray"],
+    length: Float[Array, "layer ray"],
+) -> Steps:
+    """Steps from levels at `altitude` downwards."""
+    radius = radius_of(scene)
+    other = ahead - length
+    angle = jnp.arctan2(nearest[None] * length, ahead * other + nearest[None] ** 2)
+    u, w = (jnp.asarray(x, altitude.dtype) for x in gauss_legendre(6))
+
+    def column(altitude, ahead, length):
+        along = length * u
+        q = along * (along - 2.0 * ahead)
+        r = radius + altitude
+        found = jax.vmap(lambda x: above(scene, x))(
+            jnp.maximum(altitude + q / (jnp.sqrt(jnp.maximum(r * r + q, 0.0)) + r), 0.0)
+        )
+        return length * contract("j,jm->m", w, found)
+
+    over_rays = jax.vmap(column, (None, 0, 0))
+    return Steps(length, angle, jax.vmap(over_rays)(altitude, ahead, length))
+
+
+def radius_of(scene: Scene) -> Length:
+    """That of a round world."""
+    geometry = scene.geometry
+    assert isinstance(geometry, Spherical)
+    return geometry.radius
+
+
+def above(scene: Scene, altitude: Length) -> Float[Array, "medium"]:
+    """How much there is of each medium straight above the origin."""
+    position = jnp.zeros(3, altitude.dtype).at[2].set(altitude)
+    return densities(scene, scene.geometry.locate(position))
+
+
+# Polynomials that sums over lines integrate exactly have a lower degree.
+_DEGREE = 4
+
+
+def _mended(
+    cosine: Float[Array, "level ray"], plain: Float[Array, "level ray"]
+) -> Float[Array, "level ray"]:
+    """The weights next to some for which low polynomials are integrated exactly."""
+    basis = [jnp.ones_like(cosine), 2.0 * cosine - 1.0]
+    for n in range(2, _DEGREE):
+        ahead = (2 * n - 1) * basis[1] * basis[-1]
+        basis.append((ahead - (n - 1) * basis[-2]) / n)
+    basis = jnp.stack(basis, 1)  # level, degree, ray
+    whole = jnp.asarray(np.arange(_DEGREE) == 0, cosine.dtype)[None]
+    missing = whole - contract("idk,ik->id", basis, plain)
+    size = jnp.maximum(plain, 0.0)
+    gram = contract("idk,iek,ik->ide", basis, basis, size)
+    lift = jnp.linalg.solve(gram, missing[..., None])[..., 0]
+    return plain + size * contract("idk,id->ik", basis, lift)
+
+
+def _limb(
+    cosine: Float[Array, "level line"], horizon: Float[Array, "level 1"]
+) -> Float[Array, "level line"]:
+    """Weights of lines in the limb, from level to the horizon.
+
+    By cubics between each two of them, with the slopes of parabolas at both ends, and
+    straight lines beyond the outermost. Cosines fall, and are 0 of lines that are not.
+    """
+    there = cosine > 0.0
+    step = jnp.where(there[:, 1:], cosine[:, :-1] - cosine[:, 1:], 0.0)
+    none = jnp.zeros_like(horizon)
+    before = jnp.concatenate([none, step], 1)
+    after = jnp.concatenate([step, none], 1)
+    first = jnp.asarray(np.arange(cosine.shape[1]) == 0)[None]
+    last = there & (after == 0.0)
+    ahead = jnp.where(there & first, horizon - cosine, 0.0)
+    behind = jnp.where(last, cosine, 0.0)
+
+    # The slope at a line, from those before and after it.
+    over = lambda x: jnp.where(x > 0.0, 1.0 / jnp.where(x > 0.0, x, 1.0), 0.0)
+    alone = (before == 0.0) | (after == 0.0)
+    both = over(before + after)
+    rest = jnp.where(alone, -over(before), -after * over(before) * both)
+    next = jnp.where(alone, over(after), before * over(after) * both)
+    # What slopes do to the whole.
+    share = (after * after - before * before) / 12.0
+    share += 0.5 * (behind * behind - ahead * ahead)
+    weight = 0.5 * (before + after) + ahead + behind - share * (rest + next)
+    weight += jnp.concatenate([(share * rest)[:, 1:], none], 1)
+    weight += jnp.concatenate([none, (share * next)[:, :-1]], 1)
+    return jnp.where(there, weight, 0.0)

@@ -1,0 +1,169 @@
+import dataclasses
+import math
+from typing import ClassVar
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from ..geometry import Flat
+from ..light import Sun
+from ..optics import check_layered, layers, Mixture, mixture
+from ..quantity import Direction, Position, Wavelength
+from ..scene import Scene
+from ..transport import contract
+from ._base import AbstractSolver
+from ._diffuse import Field
+from ._krylov import fixed_point
+from ._once import Once
+from ._rays import rays
+from ._step import Suns
+from ._sunlight import sunlight
+from ._suns import RoundSuns
+from ._sweep import Light, Sweep
+from .single_scattering import SingleScattering
+
+
+class Shells(AbstractSolver):
+    """All orders of scattering in a round world, by day, in twilight and from space.
+
+    Light is carried along straight lines from one of `layers` shells of air to the
+    next, a line for each shell that it does not pass and `grounded` lines that meet the
+    ground, in `azimuths` azimuths from the sun's; where the planet's shadow begins and
+    ends is exact. What scatters is kept by shell, in spherical harmonics of degrees
+    below `degrees`, for `suns` zenith angles of the sun, relative to how bright it is
+    there: it serves every sun and every place. Orders are added up by solving for their
+    sum, until it is right to `tolerance`; a solution that is not after `orders` steps
+    raises when it is run. Phase functions are without their forward peaks (delta-M,
+    Wiscombe 1977), but for light that turned once, which is added with them (Nakajima
+    and Tanaka 1988). A line of sight takes `nodes` places in each of `pieces` pieces.
+
+    Raises `ValueError` for a flat world, where a medium does not depend on altitude
+    alone, and where media have more edges than there are layers.
+    """
+
+    around: ClassVar[int] = 17
+    layers: int = eqx.field(static=True, default=40)
+    grounded: int = eqx.field(static=True, default=10)
+    azimuths: int = eqx.field(static=True, default=12)
+    degrees: int = eqx.field(static=True, default=16)
+    suns: int = eqx.field(static=True, default=64)
+    tolerance: float = eqx.field(static=True, default=1e-5)
+    orders: int = eqx.field(static=True, default=200)
+    pieces: int = eqx.field(static=True, default=12)
+    nodes: int = eqx.field(static=True, default=3)
+    single: SingleScattering = SingleScattering()
+    stokes: int = eqx.field(static=True, init=False, default=1)
+
+    def check(self, scene: Scene, wavelength: Wavelength) -> Scene:
+        check_layered(scene)
+        if isinstance(scene.geometry, Flat):
+            raise ValueError("`scene.geometry` must be round, for shells; got Flat.")
+        return scene
+
+    def baked(self, scene: Scene) -> Scene:
+        return dataclasses.replace(scene, lights=())
+
+    def prepare(self, scene: Scene, wavelength: Wavelength) -> Field:
+        mixed = mixture(scene, wavelength, self.degrees + 1).truncated()
+        start, once = self._start(scene, wavelength, mixed)
+
+        # First to see how bright it is, then relative to that.
+        def look(rough, found):
+            suns = dataclasses.replace(start.suns, rough=rough == 0)
+            sweep = dataclasses.replace(start, reference=found[0], suns=suns)
+            first = sweep.first(once)
+            bright = _brightness(scene, suns.zenith, first)
+            reference = jnp.where(suns.rough, bright, found[0])
+            return jax.lax.stop_gradient(reference), first
+
+        none = jax.eval_shape(start.first, once)
+        none = jax.tree.map(lambda x: jnp.zeros(x.shape, x.dtype), none)
+        reference, first = jax.lax.fori_loop(0, 2, look, (start.reference, none))
+        sweep = dataclasses.replace(start, reference=reference)
+        light, error = fixed_point(
+            lambda x: sweep.carry(x.moments), first, self.tolerance, self.orders
+        )
+        rule = f"`tolerance` must be reached within {self.orders} `orders`."
+        light = eqx.error_if(light, ~jnp.all(error <= self.tolerance), rule)
+        by_sun = lambda x: jnp.moveaxis(x, -2, 0)
+        return Field(
+            mixed,
+            start.rays.altitude,
+            start.suns.zenith,
+            by_sun(light.moments),
+            by_sun(light.up),
+            by_sun(light.down),
+            reference.T,
+        )
+
+    def _start(
+        self, scene: Scene, wavelength: Wavelength, mixed: Mixture
+    ) -> tuple[Sweep, Once]:
+        """How light is carried, for a reference that is everywhere 1."""
+        cut = layers(scene, mixed.extinction, self.layers)
+        lines = rays(scene, cut, self.grounded)
+        # Suns crowd where they set for the air, and there is night up to the nadir.
+        dip = scene.geometry.dip(scene.top, jnp.zeros_like(scene.top))
+        centre = 0.5 * math.pi + 0.3 * dip
+        zenith = RoundSuns(centre[None], jnp.full_like(dip, math.pi), self.suns)
+        suns = Suns(zenith, jnp.zeros((), bool), self.azimuths)
+        within = lambda x: contract("km,m...->k...", cut.column, x)
+        depth = within(mixed.extinction)[:, None]
+        thick = depth > 0.0
+        turned = within(mixed.scattering) / jnp.where(thick, depth, 1.0)
+        through = lambda steps: contract("ikm,ml->ikl", steps.column, mixed.extinction)
+        albedo = scene.ground.evaluate(wavelength)
+        start = Sweep(
+            rays=lines,
+            suns=suns,
+            up=through(lines.up),
+            down=through(lines.down),
+            turned=jnp.where(thick, turned, 0.0),
+            albedo=jnp.broadcast_to(albedo, wavelength.shape),
+            reference=jnp.zeros((self.layers + 1, self.suns), wavelength.dtype),
+        )
+        stands = zenith.zeniths(), suns.azimuth()
+        return start, Once(scene, mixed, lines, sunlight(scene), *stands)
+
+    def scattered(
+        self,
+        prepared: Field,
+        scene: Scene,
+        light: Sun,
+        wavelength: Wavelength,
+        position: Position,
+        direction: Direction,
+    ) -> Float[Array, "part wl"]:
+        look = scene, light, wavelength, position, direction
+        extinction = prepared.mixture.extinction
+        once = self.single.march(scene, extinction, *look[1:])
+        more = prepared.gather(*look, pieces=self.pieces, nodes=self.nodes)
+        return once.at[-1:].add(more)
+
+
+# What the logarithm of brightness at most loses from one sun to the next, and while the
+# sun sinks by as much as the top of the air sees below level. Light that turned once
+# ends at twice that, and other light does not: relative to what is so much darker than
+# itself it could not be joined by cubics.
+_STEEPEST, _SINKS = 1.2, 8.0
+
+
+def _brightness(
+    scene: Scene, suns: RoundSuns, light: Light
+) -> Float[Array, "level sun"]:
+    """The logarithm of how bright light is, at all wavelengths taken together."""
+    mean = light.moments[:, 0]
+    least = float(jnp.finfo(mean.dtype).tiny) ** 0.5
+    found = jnp.log(jnp.maximum(mean, least))
+    found = jnp.mean(found - found[:1, :1], -1)
+    dip = scene.geometry.dip(scene.top, jnp.zeros_like(scene.top))
+    falls = jnp.minimum(_SINKS / dip * jnp.diff(suns.zeniths()), _STEEPEST)
+
+    def follow(before, x):
+        here = jnp.maximum(x[0], before - x[1])
+        return here, here
+
+    _, rest = jax.lax.scan(follow, found[:, 0], (found[:, 1:].T, falls))
+    return jnp.concatenate([found[:, :1], rest.T], 1)

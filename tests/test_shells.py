@@ -1,0 +1,204 @@
+"""Light of all orders in a round world: its laws, and against discrete ordinates."""
+
+import math
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy.interpolate import CubicSpline
+
+from atmos.geometry import Flat, Spherical
+from atmos.light import Sun
+from atmos.medium import Ball, Exponential, Medium
+from atmos.phase import HenyeyGreenstein, Rayleigh
+from atmos.scene import Scene
+from atmos.solver import Columns, Shells, SingleScattering, solve
+from atmos.solver._krylov import fixed_point
+
+
+NM = np.array([500.0])
+TOP, RADIUS = 6e4, 6.4e6
+# One set of sizes for all tests, so that they share a compilation.
+SIZES = dict(layers=24, grounded=8, azimuths=6, degrees=6, suns=48)
+SHELLS = Shells(**SIZES)
+ONCE = SingleScattering()
+
+
+def sun(zenith):
+    level, zero = jnp.sin(zenith), jnp.zeros_like(zenith)
+    return Sun(jnp.stack([zero, level, jnp.cos(zenith)]), jnp.ones_like(zenith), 0.0)
+
+
+def world(depth=0.2, haze=0.1, white=0.9, ground=0.3, radius=RADIUS):
+    """Molecules and a haze, the optical depths of which are those straight up."""
+    air, low = 8e3, 1.5e3
+    thick = lambda height: height * (1.0 - math.exp(-TOP / height))
+    haze, rayleigh = haze / thick(low), depth / thick(air)
+    both = (
+        Medium(Exponential(air), rayleigh, 0.0 * rayleigh, Rayleigh()),
+        Medium(Exponential(low), white * haze, (1.0 - white) * haze, PHASE),
+    )
+    return Scene(Spherical(radius), TOP, both, (sun(jnp.array(1.0)),), ground)
+
+
+PHASE = HenyeyGreenstein(0.5)
+
+
+@eqx.filter_jit
+def see(sky, zenith, views, altitude):
+    """What one sees from above the origin, by a sun of this zenith angle."""
+    at = jnp.zeros_like(views[0]).at[2].set(altitude)
+    lit = eqx.tree_at(lambda x: x.scene.lights, sky, (sun(zenith),))
+    return jax.vmap(lambda view: lit.radiance(at, view)[0])(views)
+
+
+def looks(scene, solver, zeniths, views, altitude):
+    sky = solve(scene, solver, jnp.asarray(NM, views.dtype))
+    zeniths = jnp.asarray(zeniths, views.dtype)
+    return np.stack([see(sky, x, views, altitude) for x in zeniths])
+
+
+def directions(*zeniths):
+    zenith, azimuth = np.meshgrid(zeniths, [0.4, 2.8], indexing="ij")
+    level = np.sin(zenith)
+    found = level * np.sin(azimuth), level * np.cos(azimuth), np.cos(zenith)
+    return jnp.asarray(np.stack(found, -1).reshape(-1, 3))
+
+
+VIEWS = directions(0.0, 0.6, 1.2, 1.5)
+BELOW = directions(math.pi, 2.4, 2.0, 1.9)
+DAY = jnp.array([0.5, 1.2])
+EYE, TALL = jnp.array(2.0), jnp.array(4e5)
+
+
+def numbers(**changed):
+    """The same world in numbers that share a compilation."""
+    default = dict(depth=0.2, haze=0.1, white=0.9, ground=0.3, radius=RADIUS)
+    return world(**{k: jnp.array(v) for k, v in (default | changed).items()})
+
+
+def test_without_air_one_sees_the_ground_in_the_sun():
+    seen = looks(numbers(depth=0.0, haze=0.0), SHELLS, DAY, BELOW, EYE)
+    due = 0.3 / math.pi * np.cos(DAY)
+    np.testing.assert_allclose(seen, due[:, None] + 0.0 * seen, rtol=1e-4)
+
+
+def test_what_only_absorbs_is_black():
+    scene = numbers(depth=0.0, haze=1.0, white=0.0, ground=0.0)
+    assert np.all(looks(scene, SHELLS, DAY, VIEWS, EYE) == 0.0)
+
+
+def test_thin_air_scatters_once():
+    more = []
+    for thin in (1e-3, 1e-5):
+        scene = numbers(depth=thin, haze=thin, ground=0.0)
+        once = looks(scene, ONCE, DAY, VIEWS, EYE)
+        more.append(looks(scene, SHELLS, DAY, VIEWS, EYE) / once - 1.0)
+    assert np.all((more[0] > 0.0) & (more[0] < 0.1))
+    np.testing.assert_allclose(more[1], 1e-2 * more[0], rtol=0.1, atol=1e-7)
+
+
+DUSK = np.deg2rad(np.arange(88.0, 108.1, 0.5))
+
+
+@pytest.fixture(scope="module")
+def seen():
+    return looks(numbers(), SHELLS, DUSK, VIEWS, EYE)
+
+
+def test_night_falls_smoothly(seen):
+    fall = np.diff(np.log(seen), axis=0)
+    assert np.all(seen > 0.0)
+    assert np.all(fall < 0.0)
+    assert seen[0].min() / seen[-1].max() > 1e5
+    assert np.max(np.abs(np.diff(fall, axis=0))) < 0.25
+
+
+def test_single_precision_agrees_with_double(seen):
+    scene = jax.tree.map(lambda x: x.astype(jnp.float32), numbers())
+    views, eye = VIEWS.astype(jnp.float32), jnp.float32(EYE)
+    off = np.abs(looks(scene, SHELLS, DUSK, views, eye) / seen - 1.0)
+    assert np.max(off[:9]) < 1e-3
+    assert np.max(off) < 2e-2
+
+
+def test_a_huge_planet_is_flat():
+    """Against discrete ordinates, which know no lines from shell to shell."""
+    huge = numbers(radius=1e3 * RADIUS)
+    flat = eqx.tree_at(lambda x: x.geometry, huge, Flat())
+    flat = eqx.tree_at(lambda x: x.lights, flat, (sun(DAY[1]),))
+    views = jnp.concatenate([VIEWS[:6], BELOW[2:4]])
+    high = jnp.array(2e4)
+    due = see(solve(flat, Columns(layers=24), NM), DAY[1], views, high)
+    found = looks(huge, SHELLS, DAY[1:], views, high)[0]
+    np.testing.assert_allclose(found, due, rtol=2e-3)
+
+
+def test_what_is_not_absorbed_leaves():
+    """White air over white ground: all light that meets either flies out at the top."""
+    field = solve(numbers(depth=0.5, haze=0.0, ground=1.0), SHELLS, NM).prepared
+    zenith = np.asarray(field.suns.zeniths())
+    up = np.asarray(field.up)[:, -1, 0] * np.exp(np.asarray(field.reference)[:, -1])
+    leaves = 2.0 * CubicSpline(zenith, up * np.sin(zenith)).integrate(0.0, math.pi)
+    # Of parallel light, what passes by the planet at a distance and is dimmed.
+    above = np.linspace(0.0, TOP, 2001)
+    along = np.linspace(-1.5e6, 1.5e6, 4001)
+    height = np.hypot(RADIUS + above[:, None], along) - RADIUS
+    density = 0.5 / (8e3 * (1.0 - math.exp(-TOP / 8e3))) * np.exp(-height / 8e3)
+    depth = np.trapezoid(np.where(height < TOP, density, 0.0), along, axis=1)
+    passed = np.trapezoid(2.0 * (RADIUS + above) * np.exp(-depth), above)
+    met = 1.0 - passed / (RADIUS + TOP) ** 2
+    assert leaves == pytest.approx(met, rel=2e-3)
+
+
+def test_slopes_agree_with_differences():
+    """Of light that the ground returns, whose every order has a part in them."""
+
+    @jax.jit
+    def mean(ground):
+        sky = solve(numbers(ground=ground), SHELLS, NM)
+        return jnp.mean(see(sky, DAY[1], VIEWS, EYE))
+
+    at, step = jnp.array(0.3), 1e-4
+    _, slope = jax.jvp(mean, (at,), (jnp.ones_like(at),))
+    due = (mean(at + step) - mean(at - step)) / (2.0 * step)
+    # Both are as exact as the tolerance of the solution.
+    assert float(slope) == pytest.approx(float(due), rel=3e-5)
+
+
+def test_a_fixed_point_has_exact_slopes():
+    matrix = jnp.array([[0.1, 0.4], [0.3, -0.2]])
+    first = jnp.array([[1.0], [2.0]])
+    found = lambda x: fixed_point(lambda y: x * matrix @ y, first, 1e-12, 50)[0].sum()
+    due = lambda x: jnp.linalg.solve(jnp.eye(2) - x * matrix, first).sum()
+    slopes = [jax.grad(f)(0.9) for f in (found, due)]
+    assert float(slopes[0]) == pytest.approx(float(slopes[1]), rel=1e-9)
+
+
+def test_what_is_not_round_or_not_layered_is_refused():
+    flat = eqx.tree_at(lambda x: x.geometry, numbers(), Flat())
+    with pytest.raises(ValueError, match="must be round"):
+        solve(flat, SHELLS, NM)
+    ball = Medium(Ball(jnp.array([0.0, 0.0, 500.0]), 100.0), 1e-3, 0.0, PHASE)
+    uneven = Scene(Spherical(RADIUS), TOP, (ball,), (sun(DAY[0]),), 0.3)
+    with pytest.raises(ValueError, match="altitude alone"):
+        solve(uneven, SHELLS, NM)
+
+
+def test_too_few_orders_are_refused():
+    few = Shells(**SIZES, orders=2)
+    with pytest.raises(Exception, match="within 2 `orders`"):
+        jax.block_until_ready(solve(numbers(), few, NM).prepared)
+
+
+def test_a_fixed_point_solves_its_equations():
+    generator = np.random.default_rng(1)
+    matrix = jnp.asarray(generator.uniform(-0.1, 0.1, (2, 30, 30)))
+    first = jnp.asarray(generator.uniform(size=(30, 2)))
+    carry = lambda x: jnp.einsum("lij,jl->il", matrix, x)
+    found, error = fixed_point(carry, first, 1e-10, 100)
+    due = np.linalg.solve(np.eye(30) - np.asarray(matrix), first.T[..., None])[..., 0].T
+    np.testing.assert_allclose(found, due, rtol=1e-8)
+    assert np.all(error <= 1e-10)
