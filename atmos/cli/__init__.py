@@ -27,7 +27,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except OSError as error:
         name = "" if error.filename is None else f"{error.filename}: "
         return _complain(f"{name}{error.strerror or error}")
-    except (CycloptsError, ValueError) as error:
+    except (CycloptsError, ImportError, ValueError) as error:
         return _complain(str(error))
     except MemoryError:
         return _complain("out of memory; ask for fewer pixels or wavelengths")

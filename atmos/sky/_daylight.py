@@ -22,7 +22,9 @@ _EFFICACY = 683.0  # lm W^-1, of light of 555 nm
 @ft.cache
 def _components() -> tuple[np.ndarray, np.ndarray]:
     table = data.read("daylight")
-    return table["wavelength"], np.stack([table[x] for x in ("s0", "s1", "s2")])
+    return table["wavelength"].astype(float), np.stack(
+        [table[x] for x in ("s0", "s1", "s2")]
+    )
 
 
 @ft.cache

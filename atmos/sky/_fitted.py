@@ -43,7 +43,9 @@ class AbstractFittedSky(AbstractSky):
     """The sky over flat ground, as a formula for its brightness.
 
     Its spectra are sums of a few, so the formula is asked for one number each: that is
-    what makes these skies quick. Below the horizon one sees ground without end, which
+    what makes these skies quick. Such a sum may be below 0 at some wavelengths, where
+    the colour of a model is that of no light: radiance is 0 there, and a picture in
+    colour keeps the colour. Below the horizon one sees ground without end, which
     reflects the sun and the sky in all directions alike; an albedo of 0 leaves it
     black. `ranges` are where the model was fitted. Raises `ValueError` outside them
     (or see `Clamp`), and for what a place above 1 km would see.
@@ -70,7 +72,7 @@ class AbstractFittedSky(AbstractSky):
     def diffuse(self) -> Irradiance:
         """What a level plane receives from the sky without the sun, W m^-2 nm^-1."""
         total = hemisphere(self.parts, self.sun_zenith)
-        return contract("p,pl->l", total, self.basis)
+        return jnp.maximum(contract("p,pl->l", total, self.basis), 0.0)
 
     def ground_radiance(self) -> Radiance:
         """What one sees of the ground, in W m^-2 sr^-1 nm^-1."""
@@ -88,7 +90,7 @@ class AbstractFittedSky(AbstractSky):
         apart = direction - towards
         found = self.parts(jnp.maximum(up, 0.0), 0.5 * jnp.dot(apart, apart))
         sky = contract("p,pl->l", found, self.basis)
-        return jnp.where(up >= 0.0, sky, self.ground_radiance())
+        return jnp.where(up >= 0.0, jnp.maximum(sky, 0.0), self.ground_radiance())
 
     def panorama(self, position: Position) -> "FittedPanorama":
         _check_place(position)
@@ -112,6 +114,7 @@ class FittedPanorama(AbstractPanorama):
     sky: AbstractFittedSky
     basis: Float[Array, "part channel"]
     ground: Float[Array, "channel"]
+    least: float = eqx.field(static=True, default=0.0)
 
     def radiance(
         self,
@@ -125,6 +128,7 @@ class FittedPanorama(AbstractPanorama):
         look = jax.vmap(jax.vmap(sky.parts))
         seen = look(jnp.maximum(up, 0.0), turned)
         picture = contract("hwp,pc->hwc", seen, self.basis)
+        picture = jnp.maximum(picture, self.least)
         return jnp.where((up >= 0.0)[..., None], picture, self.ground)
 
     def stokes(
@@ -140,7 +144,7 @@ class FittedPanorama(AbstractPanorama):
 
     def weigh(self, response: Float[Array, "wl channel"]) -> "FittedPanorama":
         seen = lambda x: jnp.matmul(x, response, precision="highest")
-        return FittedPanorama(self.sky, seen(self.basis), seen(self.ground))
+        return FittedPanorama(self.sky, seen(self.basis), seen(self.ground), -math.inf)
 
     def finer(self) -> "FittedPanorama":
         return self

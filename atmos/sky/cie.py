@@ -5,14 +5,16 @@ import math
 from typing import ClassVar
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
+from jax.core import Tracer
 from jaxtyping import Array, ArrayLike, Float
 
 from ..quantity import Angle, as_float, Cosine, Number, Versine, Wavelength
 from ..spectrum import AbstractSpectrum
 from ._daylight import D65, DAYLIGHT, spectrum, TEMPERATURES
 from ._fitted import AbstractFittedSky, angle_between, hemisphere, set_parameters
-from ._range import AbstractBeyond, degrees, Range, REFUSE
+from ._range import AbstractBeyond, degrees, REFUSE
 
 
 # a and b of the gradation from zenith to horizon, c, d and e of the glow around the
@@ -38,7 +40,14 @@ _LEAST_RISE = 1e-6  # cosine of the zenith angle: below it nothing changes
 
 
 class AbstractScale(eqx.Module):
-    """How bright a sky is of which the shape is known."""
+    """How bright a sky is of which the shape is known: a value above 0."""
+
+    value: eqx.AbstractVar[Number]
+
+    def __check_init__(self):
+        known = not isinstance(self.value, Tracer)
+        if known and not (self.value.shape == () and 0.0 < self.value < math.inf):
+            raise ValueError(f"`value` must be above 0; got {self.value}.")
 
     @abc.abstractmethod
     def zenith_luminance(self, per_luminance: Number) -> Number:
@@ -51,7 +60,8 @@ class ZenithLuminance(AbstractScale):
     value: Number = eqx.field(converter=as_float)
 
     def zenith_luminance(self, per_luminance: Number) -> Number:
-        return self.value.astype(per_luminance.dtype)
+        del per_luminance
+        return self.value
 
 
 class HorizontalIlluminance(AbstractScale):
@@ -60,7 +70,7 @@ class HorizontalIlluminance(AbstractScale):
     value: Number = eqx.field(converter=as_float)
 
     def zenith_luminance(self, per_luminance: Number) -> Number:
-        return self.value.astype(per_luminance.dtype) / per_luminance
+        return self.value / per_luminance
 
 
 class CIE(AbstractFittedSky):
@@ -78,13 +88,12 @@ class CIE(AbstractFittedSky):
     """
 
     ranges: ClassVar = {
-        "sky_type": Range(1, 15),
         "sun_zenith": degrees(0.0, 90.0),
         "temperature": TEMPERATURES,
         "wavelength": DAYLIGHT,
     }
 
-    sky_type: int = eqx.field(static=True)
+    coefficients: Float[Array, "5"]  # a to e
     sun_zenith: Angle
     sun_azimuth: Angle
     scale: AbstractScale
@@ -107,7 +116,6 @@ class CIE(AbstractFittedSky):
             raise ValueError(
                 f"`sky_type` must be a whole number from 1 to 15; got {sky_type!r}."
             )
-        self.sky_type = sky_type
         set_parameters(
             self,
             beyond,
@@ -117,14 +125,15 @@ class CIE(AbstractFittedSky):
             ground=ground,
             temperature=temperature,
         )
-        self.scale = scale
+        self.coefficients = jnp.asarray(COEFFICIENTS[sky_type], self.wavelength.dtype)
+        self.scale = jax.tree.map(lambda x: x.astype(self.wavelength.dtype), scale)
 
     def relative(self, up: Cosine, turned: Versine) -> Number:
         """The luminance, relative to that of the zenith."""
-        a, b, c, d, e = COEFFICIENTS[self.sky_type]
+        a, b, c, d, e = self.coefficients
         grade = lambda up: 1.0 + a * jnp.exp(b / up)
         glow = lambda angle, cosine: (
-            1.0 + c * (jnp.exp(d * angle) - math.exp(0.5 * math.pi * d)) + e * cosine**2
+            1.0 + c * (jnp.exp(d * angle) - jnp.exp(0.5 * math.pi * d)) + e * cosine**2
         )
         sun, one = self.sun_zenith, jnp.ones_like(up)
         here = grade(jnp.maximum(up, _LEAST_RISE))

@@ -8,6 +8,7 @@ from typing import ClassVar
 
 import jax.numpy as jnp
 import numpy as np
+from jax.core import Tracer
 from jaxtyping import Array, ArrayLike, Float
 
 from ..light import SOLAR_RADIUS, Sun
@@ -127,7 +128,8 @@ class Perez(AbstractFittedSky):
 
     Angles in rad, wavelengths in nm, `water` vapour in cm, `distance` of the sun in
     astronomical units; `ground` is the albedo of what lies below the horizon. Raises
-    `ValueError` outside `ranges`, unless `beyond` is `Clamp()`.
+    `ValueError` outside `ranges`, unless `beyond` is `Clamp()`, and for a sun
+    stronger than outside the air.
     """
 
     ranges: ClassVar = {
@@ -176,6 +178,13 @@ class Perez(AbstractFittedSky):
             water=water,
             distance=distance,
         )
+        direct = self.irradiances[0]
+        most = _SOLAR_CONSTANT / self.distance**2
+        if not isinstance(direct, Tracer) and not direct <= most:
+            raise ValueError(
+                "`clearness` and `brightness` must leave the sun weaker than outside "
+                f"the air, {float(most):.5g} W m^-2; got {float(direct):.5g} W m^-2."
+            )
 
     @classmethod
     def measured(
@@ -244,7 +253,7 @@ class Perez(AbstractFittedSky):
         dull_c = jnp.exp((bright * (c[0] + c[1] * sun)) ** c[2]) - c[3]
         dull_d = -jnp.exp(bright * (d[0] + d[1] * sun)) + d[2] + bright * d[3]
         dull = found.at[2].set(dull_c).at[3].set(dull_d)
-        return jnp.where(self.clearness < _BINS[1], dull, found)
+        return jnp.where(self.clearness < float(_BINS[1]), dull, found)
 
     def relative(self, up: Cosine, turned: Versine) -> Number:
         """The formula: luminance in whatever unit."""

@@ -209,7 +209,8 @@ def _cubic(coefficients: tuple[float, ...], x: Number) -> Number:
 @ft.cache
 def _absorption() -> tuple[np.ndarray, ...]:
     table = data.read("preetham_sun")
-    return tuple(table[x] for x in ("wavelength", "ozone", "gas", "vapour"))
+    names = "wavelength", "ozone", "gas", "vapour"
+    return tuple(table[x].astype(float) for x in names)
 
 
 def _sunlight(dtype: np.dtype) -> tuple[Array, Array]:
