@@ -35,6 +35,7 @@ ROOMS = [
     "rays",
     "camera",
     "image",
+    "comparison",
     "render",
     "disk",
     "rays",

@@ -1,6 +1,7 @@
 """From words to fitted skies."""
 
 import dataclasses
+from collections.abc import Sequence
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -36,7 +37,9 @@ _FOR = {
     "brightness": ("perez",),
     "colour_temperature": ("cie", "perez"),
 }
+MODELS = (*_HAZY, "cie", "perez")
 _TURBIDITY = 3.0
+_UNSET = (None, False)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -106,41 +109,44 @@ class Model:
         switch("Move what a model was not fitted to to the edge of what it was."),
     ] = False
 
-    def check(self, world: World) -> None:
-        """Refuses options that do not go together."""
-        given = {k: v for k, v in vars(self).items() if v not in (None, False)}
-        if self.model is None:
-            for name in given:
-                refuse(_spelt(name), "needs a --model")
-            return
-        for name in given:
-            if name in _FOR and self.model not in _FOR[name]:
-                models = " or ".join(_FOR[name])
-                refuse(
-                    _spelt(name), f"is for --model {models}", f"--model {self.model}"
-                )
-        for name, value in vars(world).items():
-            if value is not None and name != "ground":
-                refuse(_spelt(name), "must not stand beside --model", self.model)
-        if self.model == "cie":
-            self._one_of(("zenith_luminance",), ("horizontal_illuminance",))
-        if self.model == "perez":
-            self._one_of(("direct", "diffuse"), ("clearness", "brightness"))
+    def check(self, kinds: Sequence[str], world: World, alone: bool = True) -> None:
+        """Refuses options that do not go together with models of these names.
 
-    def bands(self, last: float = 780.0) -> tuple[float, ...]:
+        Nothing but models is made where they are `alone`.
+        """
+        names = [k for k, x in vars(self).items() if k != "model" and x not in _UNSET]
+        for name in names:
+            if not kinds:
+                refuse(_spelt(name), "needs a model")
+            if name in _FOR and not set(kinds) & set(_FOR[name]):
+                rule = f"is for the models {', '.join(_FOR[name])}"
+                refuse(_spelt(name), rule, ", ".join(kinds))
+        for name, value in vars(world).items():
+            if kinds and alone and value is not None and name != "ground":
+                refuse(_spelt(name), "must not stand beside models", ", ".join(kinds))
+        if "cie" in kinds:
+            self._one_of("cie", ("zenith_luminance",), ("horizontal_illuminance",))
+        if "perez" in kinds:
+            self._one_of("perez", ("direct", "diffuse"), ("clearness", "brightness"))
+
+    def bands(self, kind: str | None) -> tuple[float, ...]:
         """The wavelengths of a picture if none are asked for."""
-        if self.model == "hosek" and not self.clamp:
-            last = Hosek.ranges["wavelength"].high
+        short = kind == "hosek" and not self.clamp
+        last = Hosek.ranges["wavelength"].high if short else 780.0
         return tuple(np.arange(380.0, last + 1.0, 10.0).tolist())
 
     def sky(
-        self, sun: SunPosition, world: World, wavelength: Float[np.ndarray, "wl"]
+        self,
+        kind: str,
+        sun: SunPosition,
+        world: World,
+        wavelength: Float[np.ndarray, "wl"],
     ) -> AbstractFittedSky:
-        """The sky that is asked for."""
+        """The sky of one model."""
         zenith, azimuth, distance = sun.find() or (75.0, 40.0, 1.0)
         if zenith > 90.0 and not self.clamp:
             name = "--sun-elevation" if sun.date is None else "--date"
-            rule = f"must leave the sun above the horizon with --model {self.model}"
+            rule = f"must leave the sun above the horizon with the model {kind}"
             refuse(name, rule, f"elevation {90.0 - zenith:.5g}")
         towards = {"sun_zenith": zenith * deg, "sun_azimuth": azimuth * deg}
         rest = {
@@ -154,18 +160,23 @@ class Model:
         )
         names |= {"temperature": "--colour-temperature", "value": _spelt(scale)}
         with about(names):
-            return self._build(towards | rest, distance)
+            return self._build(kind, towards | rest, distance)
 
-    def _build(self, given: dict[str, Any], distance: float) -> AbstractFittedSky:
-        if self.model in _HAZY:
+    def _build(
+        self, kind: str, given: dict[str, Any], distance: float
+    ) -> AbstractFittedSky:
+        if kind in _HAZY:
             kinds = {"preetham": Preetham, "hosek": Hosek, "hosek-rgb": HosekRGB}
             haze = _TURBIDITY if self.turbidity is None else self.turbidity
-            return kinds[self.model](turbidity=haze, **given)
+            return kinds[kind](turbidity=haze, **given)
         if self.colour_temperature is not None:
             given["temperature"] = self.colour_temperature
-        if self.model == "cie":
+        if kind == "cie":
             up, down = self.zenith_luminance, self.horizontal_illuminance
-            scale = ZenithLuminance(up) if down is None else HorizontalIlluminance(down)
+            if up is None:
+                scale = HorizontalIlluminance(down or 0.0)
+            else:
+                scale = ZenithLuminance(up)
             return CIE(self.cie_type or 12, scale=scale, **given)
         given["distance"] = distance
         if self.direct is None or self.diffuse is None:
@@ -173,16 +184,16 @@ class Model:
             return Perez(**measures, **given)
         return Perez.measured(direct=self.direct, diffuse=self.diffuse, **given)
 
-    def _one_of(self, *groups: tuple[str, ...]) -> None:
+    def _one_of(self, kind: str, *groups: tuple[str, ...]) -> None:
         """Refuses all but one whole group of options."""
         asked = [any(getattr(self, x) is not None for x in g) for g in groups]
         whole = [all(getattr(self, x) is not None for x in g) for g in groups]
         if sum(asked) != 1 or asked != whole:
             choices = ", or ".join(" and ".join(map(_spelt, g)) for g in groups)
-            refuse("--model", f"{self.model} needs {choices}, and not both")
+            refuse(kind, f"needs {choices}, and not both")
 
     def __str__(self) -> str:
-        given = {k: v for k, v in vars(self).items() if v not in (None, False)}
+        given = {k: v for k, v in vars(self).items() if v not in _UNSET}
         return ", ".join(f"{_spelt(k)} {v}" for k, v in given.items())
 
 

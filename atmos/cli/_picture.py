@@ -75,24 +75,25 @@ def sky(
     world, sun, view = world or World(), sun or SunPosition(), view or View()
     files, model = files or Files(), model or Model()
     preview = files.check()
-    model.check(world)
-    if model.model is not None:
+    kind = model.model
+    model.check([kind] if kind else [], world)
+    if kind is not None:
         for name, value in {"scene": scene, "--solver": solver, "--bake": bake}.items():
             if value is not None:
-                refuse(name, "must not stand beside --model", model.model)
+                refuse(name, "must not stand beside --model", kind)
         if stokes != 1:
             refuse("--stokes", "must be 1 with --model", stokes)
     solver = solver or "single"
     check_bake(bake, solver)
     start()
 
-    wavelength = np.array(files.wavelength or model.bands(), np.float32)
+    wavelength = np.array(files.wavelength or model.bands(kind), np.float32)
     camera, said = view.camera(), observed(sun, view)
-    if model.model is not None:
-        if model.model == "hosek-rgb" and files.colour_space == "spectral":
+    if kind is not None:
+        if kind == "hosek-rgb" and files.colour_space == "spectral":
             refuse("--colour-space", "must not be spectral with --model hosek-rgb")
         said |= {"model": str(model)}
-        fitted = lambda: model.sky(sun, world, wavelength)
+        fitted = lambda: model.sky(kind, sun, world, wavelength)
         write_picture(fitted, camera, wavelength, files, preview, said)
         return
     step = (wavelength[-1] - wavelength[0]) / max(1, wavelength.size - 1) or 10.0
