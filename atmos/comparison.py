@@ -16,8 +16,8 @@ _DARK = 1e-3  # of the brightest pixel: differences are relative to that at leas
 _DARKER, _ALIKE, _BRIGHTER = (33, 102, 172), (247, 247, 247), (178, 24, 43)
 _STEPS = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0]
 
-XYZ = Float[Array | np.ndarray, "height width 3"]
-Weight = Float[Array | np.ndarray, "#height #width"]
+XYZ = Float[Array | np.ndarray, "_ _ 3"]
+Weight = Float[Array | np.ndarray, "_ _"]
 
 
 class Difference(NamedTuple):

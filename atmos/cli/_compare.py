@@ -30,7 +30,7 @@ from ._app import (
 from ._model import Model, MODELS
 from ._options import check_output, SunPosition, View, World
 from ._session import progress_bar, start
-from ._world import make_scene, solve_file, solver_named
+from ._world import about, make_scene, solve_file, solver_named
 
 
 _SOLVERS = ("single", "shared", "columns")
@@ -146,10 +146,10 @@ def _make(name: str, world: World, sun: SunPosition, model: Model, view: View) -
         scene = make_scene(None, world, sun, 10.0)
         method = solver_named(name, 1, float(camera.position[2]))
         sky = solve_file(scene, method, bands, None)
-    with progress_bar(name) as tell:
-        weights = colour.response(jnp.asarray(bands))
+    weights = colour.response(jnp.asarray(bands))
+    with progress_bar(name) as tell, about({"position": "--altitude"}):
         xyz = np.asarray(render(sky, camera, weights, progress=tell))
-    x, y = jnp.arange(camera.width) + 0.5, jnp.arange(camera.height) + 0.5
+    x, y = (jnp.arange(float(n)) + 0.5 for n in (camera.width, camera.height))
     area = jax.vmap(jax.vmap(camera.solid_angle, (0, None)), (None, 0))(x, y)
     seen = np.asarray(area) * np.asarray(camera.sees())
     return _Seen(name, xyz, seen, isinstance(camera, LatLong))

@@ -39,7 +39,6 @@ _FOR = {
 }
 MODELS = (*_HAZY, "cie", "perez")
 _TURBIDITY = 3.0
-_UNSET = (None, False)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -114,7 +113,7 @@ class Model:
 
         Nothing but models is made where they are `alone`.
         """
-        names = [k for k, x in vars(self).items() if k != "model" and x not in _UNSET]
+        names = [x for x in self._given() if x != "model"]
         for name in names:
             if not kinds:
                 refuse(_spelt(name), "needs a model")
@@ -155,10 +154,12 @@ class Model:
             "beyond": Clamp() if self.clamp else Refuse(),
         }
         names = {x: _spelt(x) for x in (*_FOR, "wavelength", "ground")}
-        scale = (
-            "zenith_luminance" if self.zenith_luminance else "horizontal_illuminance"
-        )
-        names |= {"temperature": "--colour-temperature", "value": _spelt(scale)}
+        names["temperature"] = "--colour-temperature"
+        down = self.zenith_luminance is None
+        names["value"] = "--horizontal-illuminance" if down else "--zenith-luminance"
+        if self.diffuse is not None:
+            for name in ("clearness", "brightness"):
+                names[name] = f"the {name} of --direct and --diffuse"
         with about(names):
             return self._build(kind, towards | rest, distance)
 
@@ -172,11 +173,8 @@ class Model:
         if self.colour_temperature is not None:
             given["temperature"] = self.colour_temperature
         if kind == "cie":
-            up, down = self.zenith_luminance, self.horizontal_illuminance
-            if up is None:
-                scale = HorizontalIlluminance(down or 0.0)
-            else:
-                scale = ZenithLuminance(up)
+            up, down = self.zenith_luminance, self.horizontal_illuminance or 0.0
+            scale = HorizontalIlluminance(down) if up is None else ZenithLuminance(up)
             return CIE(self.cie_type or 12, scale=scale, **given)
         given["distance"] = distance
         if self.direct is None or self.diffuse is None:
@@ -193,8 +191,10 @@ class Model:
             refuse(kind, f"needs {choices}, and not both")
 
     def __str__(self) -> str:
-        given = {k: v for k, v in vars(self).items() if v not in _UNSET}
-        return ", ".join(f"{_spelt(k)} {v}" for k, v in given.items())
+        return ", ".join(f"{_spelt(k)} {v}" for k, v in self._given().items())
+
+    def _given(self) -> dict[str, Any]:
+        return {k: v for k, v in vars(self).items() if v is not None and v is not False}
 
 
 def _spelt(name: str) -> str:

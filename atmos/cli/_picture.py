@@ -29,7 +29,7 @@ from ._options import (
     World,
 )
 from ._session import progress_bar, start
-from ._world import make_scene, solve_file, solver_named
+from ._world import about, make_scene, solve_file, solver_named
 
 
 _LARGEST_HALF = 65504.0
@@ -94,7 +94,8 @@ def sky(
             refuse("--colour-space", "must not be spectral with --model hosek-rgb")
         said |= {"model": str(model)}
         fitted = lambda: model.sky(kind, sun, world, wavelength)
-        write_picture(fitted, camera, wavelength, files, preview, said)
+        with about({"position": "--altitude"}):
+            write_picture(fitted, camera, wavelength, files, preview, said)
         return
     step = (wavelength[-1] - wavelength[0]) / max(1, wavelength.size - 1) or 10.0
     found = make_scene(scene, world, sun, float(step))

@@ -200,11 +200,13 @@ class Perez(AbstractFittedSky):
         """The sky of two readings in W m^-2.
 
         `direct` is what a plane facing the sun receives from it, `diffuse` what a level
-        plane receives from the sky without the sun.
+        plane receives from the sky without the sun. `rest` is that of the class.
         """
         zenith, direct, diffuse = (
             as_float(x).astype(float) for x in (sun_zenith, direct, diffuse)
         )
+        if not isinstance(diffuse, Tracer) and not diffuse > 0.0:
+            raise ValueError(f"`diffuse` must be above 0 W m^-2; got {diffuse}.")
         apart = _ZENITH_FACTOR * zenith**3
         clearness = ((diffuse + direct) / diffuse + apart) / (1.0 + apart)
         outside = _SOLAR_CONSTANT / as_float(distance).astype(float) ** 2
