@@ -84,7 +84,7 @@ class Hosek(AbstractFittedSky):
     def parts(self, up: Cosine, turned: Versine) -> Float[Array, "part"]:
         albedo = self.ground.evaluate(jnp.asarray(_CHANNELS, up.dtype))
         configured = _configured("spec", self.turbidity, albedo, self.sun_zenith)
-        return jnp.maximum(_shape(*configured, up, turned), 0.0)
+        return _shape(*configured, up, turned)
 
     @property
     def basis(self) -> Float[Array, "part wl"]:
