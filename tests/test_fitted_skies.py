@@ -196,6 +196,7 @@ def test_the_ground_has_a_gradient():
     np.testing.assert_allclose(slope.ground.value, value / 0.2, rtol=1e-9)
 
 
+BROKEN = {"sun_zenith": 86.7 * deg, "clearness": 6.95, "brightness": 0.275}
 OUTSIDE = [
     ("preetham", {"turbidity": 7.0}, "`turbidity` must lie between 2 and 6"),
     ("preetham", {"turbidity": math.nan}, "got nan"),
@@ -219,6 +220,7 @@ OUTSIDE = [
     ("perez", {"clearness": 0.9}, "`clearness`"),
     ("perez", {"brightness": 0.7}, "`brightness` must lie between 0.01 and 0.6"),
     ("perez", {"clearness": 11.0, "brightness": 0.5}, "weaker than outside the air"),
+    ("perez", BROKEN, "must be those of a measured sky"),
 ]
 GIVEN = {
     "preetham": (Preetham, {"turbidity": 3.0}),

@@ -12,7 +12,8 @@ from .cie import (
     HorizontalIlluminance as HorizontalIlluminance,
     ZenithLuminance as ZenithLuminance,
 )
-from .hosek import Hosek as Hosek, HosekRGB as HosekRGB
+from .hosek import Hosek as Hosek
+from .hosek_rgb import HosekRGB as HosekRGB
 from .panorama import (
     fine_enough as fine_enough,
     Grid as Grid,

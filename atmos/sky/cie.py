@@ -13,7 +13,8 @@ from jaxtyping import Array, ArrayLike, Float
 from ..quantity import Angle, as_float, Cosine, Number, Versine, Wavelength
 from ..spectrum import AbstractSpectrum
 from ._daylight import D65, DAYLIGHT, spectrum, TEMPERATURES
-from ._fitted import AbstractFittedSky, angle_between, hemisphere, set_parameters
+from ._fitted import AbstractFittedSky, angle_between, hemisphere
+from ._parameters import set_parameters
 from ._range import AbstractBeyond, degrees, REFUSE
 
 
@@ -147,11 +148,12 @@ class CIE(AbstractFittedSky):
         return self.scale.zenith_luminance(hemisphere(look, self.sun_zenith)[0])
 
     def parts(self, up: Cosine, turned: Versine) -> Float[Array, "part"]:
-        return (self.zenith_luminance * self.relative(up, turned))[None]
+        return self.relative(up, turned)[None]
 
     @property
     def basis(self) -> Float[Array, "part wl"]:
-        return spectrum(self.temperature, self.wavelength)[None]
+        light = spectrum(self.temperature, self.wavelength)
+        return self.zenith_luminance * light[None]
 
     @property
     def lights(self) -> tuple[()]:

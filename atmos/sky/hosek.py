@@ -11,7 +11,6 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
-from ..colour import REC709, response
 from ..light import SOLAR_RADIUS, Sun
 from ..quantity import (
     Angle,
@@ -28,16 +27,15 @@ from ..quantity import (
 from ..spectrum import AbstractSpectrum, Tabulated
 from ._fitted import (
     AbstractFittedSky,
-    angle_between,
-    set_parameters,
     straight,
 )
+from ._hosek_formula import between, configured, RANGES, shape
 from ._hosek_tables import sky_tables, sun_tables
-from ._range import AbstractBeyond, degrees, Range, REFUSE
+from ._parameters import set_parameters
+from ._range import AbstractBeyond, Range, REFUSE
 
 
 _CHANNELS = np.arange(320.0, 721.0, 40.0)  # nm
-_RANGES = {"turbidity": Range(1.0, 10.0), "sun_zenith": degrees(0.0, 90.0)}
 _PIECES = 45
 _LEAST = 1e-30
 
@@ -53,7 +51,7 @@ class Hosek(AbstractFittedSky):
     `ranges`, unless `beyond` is `Clamp()`, and `ImportError` without coefficients.
     """
 
-    ranges: ClassVar = {**_RANGES, "wavelength": Range(320.0, 720.0, " nm")}
+    ranges: ClassVar = {**RANGES, "wavelength": Range(320.0, 720.0, " nm")}
 
     sun_zenith: Angle
     sun_azimuth: Angle
@@ -83,8 +81,8 @@ class Hosek(AbstractFittedSky):
 
     def parts(self, up: Cosine, turned: Versine) -> Float[Array, "part"]:
         albedo = self.ground.evaluate(jnp.asarray(_CHANNELS, up.dtype))
-        configured = _configured("spec", self.turbidity, albedo, self.sun_zenith)
-        return _shape(*configured, up, turned)
+        found = configured("spec", self.turbidity, albedo, self.sun_zenith)
+        return shape(*found, up, turned)
 
     @property
     def basis(self) -> Float[Array, "part wl"]:
@@ -138,118 +136,6 @@ class Hosek(AbstractFittedSky):
         piece = jnp.clip(jnp.floor(at), 0.0, _PIECES - 1.0)
         x = elevation - 0.5 * math.pi * (piece / _PIECES) ** 3
         table = jnp.asarray(sun_tables().radiance, self._dtype)
-        cubic = _between(table, self.turbidity - 1.0)[piece.astype(int)]
+        cubic = between(table, self.turbidity - 1.0)[piece.astype(int)]
         powers = jnp.stack([x**k for k in range(4)])
         return jnp.maximum(jnp.dot(cubic, powers, precision="highest"), 0.0)
-
-
-class HosekRGB(AbstractFittedSky):
-    """The same sky as linear Rec. 709, fitted in colour: `colour` is the model.
-
-    Its spectra are made up, so that they have these colours under the wavelengths
-    asked for, which must cover what the eye sees: for pictures in colour, not for
-    light at one wavelength. There is no sun.
-    """
-
-    ranges: ClassVar = {**_RANGES, "wavelength": Range(360.0, 830.0, " nm")}
-
-    sun_zenith: Angle
-    sun_azimuth: Angle
-    turbidity: Number
-    wavelength: Wavelength
-    ground: AbstractSpectrum
-
-    def __init__(
-        self,
-        sun_zenith: ArrayLike,
-        sun_azimuth: ArrayLike,
-        turbidity: ArrayLike,
-        wavelength: ArrayLike,
-        ground: ArrayLike | AbstractSpectrum = 0.0,
-        beyond: AbstractBeyond = REFUSE,
-    ):
-        sky_tables("rgb")
-        set_parameters(
-            self,
-            beyond,
-            sun_zenith=sun_zenith,
-            sun_azimuth=sun_azimuth,
-            turbidity=turbidity,
-            wavelength=wavelength,
-            ground=ground,
-        )
-
-    def colour(self, up: Cosine, turned: Versine) -> Float[Array, "3"]:
-        """Red, green and blue of the sky, as `atmos.colour.REC709` counts them.
-
-        Not below 0, as the fit is in places.
-        """
-        configured = _configured("rgb", self.turbidity, self._albedo, self.sun_zenith)
-        return jnp.maximum(_shape(*configured, up, turned), 0.0)
-
-    def parts(self, up: Cosine, turned: Versine) -> Float[Array, "part"]:
-        return self.colour(up, turned)
-
-    @property
-    def basis(self) -> Float[Array, "part wl"]:
-        # Of all spectra of the three colours the least.
-        weights = REC709.from_xyz(response(self.wavelength))
-        square = jnp.matmul(weights.T, weights, precision="highest")
-        return jnp.linalg.solve(square, weights.T)
-
-    @property
-    def lights(self) -> tuple[()]:
-        return ()
-
-    @property
-    def _albedo(self) -> Float[Array, "3"]:
-        """What the ground reflects of each colour of a white light."""
-        weights = REC709.from_xyz(response(self.wavelength))
-        albedo = self.ground.evaluate(self.wavelength)
-        seen = jnp.sum(albedo[:, None] * weights, 0) / jnp.sum(weights, 0)
-        return jnp.clip(seen, 0.0, 1.0)
-
-
-def _configured(
-    kind: str, turbidity: Number, albedo: Spectral, sun_zenith: Angle
-) -> tuple[Float[Array, "channel 9"], Float[Array, "channel"]]:
-    """The shape's coefficients, and the mean radiance that it multiplies."""
-    elevation = jnp.maximum(0.5 * math.pi - sun_zenith, 0.0)
-    x = jnp.cbrt(elevation * (2.0 / math.pi))
-    bezier = [math.comb(5, k) * x**k * (1.0 - x) ** (5 - k) for k in range(6)]
-    weights = jnp.stack(bezier)
-
-    def table(values):
-        between = _between(jnp.asarray(values, x.dtype), turbidity - 1.0)
-        dark, white = jnp.tensordot(weights, between, (0, 1), precision="highest")
-        share = albedo.reshape(-1, *(1,) * (dark.ndim - 1))
-        return dark + share * (white - dark)
-
-    shape, mean = sky_tables(kind)
-    return table(shape), table(mean)
-
-
-def _shape(
-    coefficients: Float[Array, "channel 9"],
-    mean: Float[Array, "channel"],
-    up: Cosine,
-    turned: Versine,
-) -> Float[Array, "channel"]:
-    """The formula of the paper."""
-    a, b, c, d, e, f, g, i, h = coefficients.T
-    cosine = 1.0 - turned
-    square = cosine * cosine
-    # 1 + h^2 - 2 h cos, which loses no digits near the sun.
-    ring = (1.0 - h) ** 2 + 2.0 * h * turned
-    chi = (1.0 + square) / (ring * jnp.sqrt(ring))
-    some = up > 0.0
-    root = jnp.where(some, jnp.sqrt(jnp.where(some, up, 1.0)), 0.0)
-    glow = c + d * jnp.exp(e * angle_between(turned)) + f * square + g * chi + i * root
-    return (1.0 + a * jnp.exp(b / (up + 0.01))) * glow * mean
-
-
-def _between(table: Float[Array, "n *rest"], place: Number) -> Float[Array, "*rest"]:
-    """The table at a place between its entries, on a straight line."""
-    first = jnp.clip(jnp.floor(place), 0.0, table.shape[0] - 2.0)
-    low, high = table[first.astype(int)], table[first.astype(int) + 1]
-    return low + (place - first) * (high - low)

@@ -30,9 +30,9 @@ from ._daylight import components, DAYLIGHT, luminances, mixture
 from ._fitted import (
     AbstractFittedSky,
     angle_between,
-    set_parameters,
     straight,
 )
+from ._parameters import set_parameters
 from ._range import AbstractBeyond, degrees, Range, REFUSE
 
 
