@@ -26,6 +26,7 @@ from atmos.sky import (
     ZenithLuminance,
 )
 from atmos.sky._aerial import haze
+from atmos.sky._daylight import components, spectrum
 from atmos.sky._hosek_tables import _FLOAT64, _MAGIC, _read
 
 
@@ -177,7 +178,7 @@ def brightness(sky, directions):
     return jnp.sum(jax.vmap(look)(directions))
 
 
-@every_sky
+@pytest.mark.parametrize("name", [x for x in MODELS if x.values != ("hosek-rgb",)])
 def test_every_number_has_a_gradient_everywhere(name):
     sky, rays = SKIES[name](55 * deg, ground=0.2), hard_directions(55 * deg)
     rays = rays[rays[:, 2] >= 0.0]
@@ -271,13 +272,18 @@ def test_skies_seen_from_the_ground_are_not_shown_from_an_aeroplane():
 # --- Preetham, Shirley and Smits 1999
 
 
+@eqx.filter_jit
+def spectra(sky, directions):
+    towards, fine = light_of(sky), jnp.asarray(FINE)
+    parts = jax.vmap(lambda x: sky.parts(x[2], versine(x, towards)))(directions)
+    return colour.to_xyz(parts @ components(fine), fine)
+
+
 @pytest.mark.parametrize("turbidity", [2.0, 4.0, 6.0])
 def test_preethams_spectra_have_his_colours(turbidity):
-    nm = FINE
-    sky = Preetham(60 * deg, 0.7, turbidity, nm)
+    sky = Preetham(60 * deg, 0.7, turbidity, NM)
     rays = toward(np.array([0.0, 0.5, 1.3]), np.array([0.0, 1.0, 0.7]))
-    seen = np.asarray(colour.to_xyz(look(sky, rays), sky.wavelength))
-    model = np.asarray(coloured(sky, rays))
+    seen, model = np.asarray(spectra(sky, rays)), np.asarray(coloured(sky, rays))
     # The formulas from chromaticity to daylight are rounded.
     for xyz, (luminance, x, y) in zip(seen, model, strict=True):
         np.testing.assert_allclose(xyz[1], luminance, rtol=1e-3)
@@ -536,19 +542,22 @@ def test_the_zeniths_share_of_the_light_is_as_published(kind):
         np.testing.assert_allclose(zenith_luminance(sky), published, rtol=0.035)
 
 
+def lux(irradiance):
+    """To 0.2 %, at wavelengths so far apart."""
+    return float(colour.to_xyz(irradiance, jnp.asarray(NM))[..., 1])
+
+
 def test_scales_are_what_they_say():
-    nm = FINE
-    weigh = lambda x: float(colour.to_xyz(x, jnp.asarray(nm))[..., 1])
-    sky = CIE(12, 1.0, 0.0, ZenithLuminance(2500.0), nm)
-    np.testing.assert_allclose(weigh(look(sky, ZENITH[None])[0]), 2500.0, rtol=1e-4)
-    sky = CIE(12, 1.0, 0.0, HorizontalIlluminance(12e3), nm)
-    np.testing.assert_allclose(weigh(receive(sky)[0]), 12e3, rtol=1e-4)
+    sky = CIE(12, 1.0, 0.0, ZenithLuminance(2500.0), NM)
+    np.testing.assert_allclose(lux(look(sky, ZENITH[None])[0]), 2500.0, rtol=2e-3)
+    sky = CIE(12, 1.0, 0.0, HorizontalIlluminance(12e3), NM)
+    np.testing.assert_allclose(lux(receive(sky)[0]), 12e3, rtol=2e-3)
 
 
-def test_daylight_of_6504_kelvin_is_d65():
-    nm = FINE
-    sky = CIE(5, 1.0, 0.0, ZenithLuminance(1.0), nm)
-    xyz = np.asarray(colour.to_xyz(look(sky, ZENITH[None]), jnp.asarray(nm)))[0]
+def test_daylight_of_6504_kelvin_is_d65_of_one_candela():
+    light = jax.jit(spectrum)(jnp.asarray(6504.0), jnp.asarray(FINE))
+    xyz = np.asarray(colour.to_xyz(light, jnp.asarray(FINE)))
+    np.testing.assert_allclose(xyz[1], 1.0, rtol=1e-4)
     np.testing.assert_allclose(xyz[:2] / xyz.sum(), colour.D65, atol=2e-4)
 
 
@@ -576,16 +585,14 @@ def test_perez_has_the_coefficients_of_radiance(
 
 
 def test_perez_sends_down_what_was_measured():
-    nm = FINE
-    sky = Perez.measured(50 * deg, 0.0, 700.0, 120.0, nm)
+    sky = Perez.measured(50 * deg, 0.0, 700.0, 120.0, NM)
     np.testing.assert_allclose(sky.irradiances, [700.0, 120.0], rtol=1e-12)
     direct, diffuse = (float(x) for x in sky.illuminances)
     # Perez et al. 1990: about 100 lm/W from the sun, 130 from a clear sky.
     assert 90.0 < direct / 700.0 < 115.0 and 110.0 < diffuse / 120.0 < 150.0
     fallen, (beam,) = receive(sky)
-    lux = lambda x: float(colour.to_xyz(x, jnp.asarray(nm))[1])
-    np.testing.assert_allclose(lux(fallen), diffuse, rtol=1e-4)
-    np.testing.assert_allclose(lux(beam), direct, rtol=1e-4)
+    np.testing.assert_allclose(lux(fallen), diffuse, rtol=2e-3)
+    np.testing.assert_allclose(lux(beam), direct, rtol=2e-3)
 
 
 def test_overcast_skies_have_no_sun():

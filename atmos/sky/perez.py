@@ -8,6 +8,7 @@ import math
 from typing import ClassVar
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.core import Tracer
@@ -93,16 +94,22 @@ class Perez(AbstractFittedSky):
             water=water,
             distance=distance,
         )
+        self._check()
+
+    def _check(self) -> None:
+        """Refuses skies that there are not, if all numbers are known."""
         direct = self.irradiances[0]
+        if any(isinstance(x, Tracer) for x in (direct, *jax.tree.leaves(self))):
+            return
         most = _SOLAR_CONSTANT / self.distance**2
-        if not isinstance(direct, Tracer) and not direct <= most:
+        if not direct <= most:
             raise ValueError(
                 "`clearness` and `brightness` must leave the sun weaker than outside "
                 f"the air, {float(most):.5g} W m^-2; got {float(direct):.5g} W m^-2."
             )
         # One wavelength will do, so that all share a compilation.
         short = eqx.tree_at(lambda x: x.wavelength, self, self.wavelength[:1])
-        if not isinstance(direct, Tracer) and not _excess(short) <= _MOST_EXCESS:
+        if not _excess(short) <= _MOST_EXCESS:
             raise ValueError(
                 "`clearness` and `brightness` must be those of a measured sky; "
                 f"got {float(self.clearness):.4g} and {float(self.brightness):.4g}, "
