@@ -6,13 +6,24 @@ import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
 from ..colour import REC709, response
-from ..quantity import Angle, Cosine, Number, Versine, Wavelength
+from ..light import Sun
+from ..quantity import (
+    Angle,
+    Cosine,
+    Depth,
+    Direction,
+    Number,
+    Position,
+    Versine,
+    Wavelength,
+)
 from ..spectrum import AbstractSpectrum
 from ._fitted import AbstractFittedSky
 from ._hosek_formula import configured, RANGES, shape
 from ._hosek_tables import sky_tables
 from ._parameters import set_parameters
-from ._range import AbstractBeyond, Range, REFUSE
+from ._range import AbstractBeyond, Clamp, Range, REFUSE
+from .hosek import Hosek
 
 
 class HosekRGB(AbstractFittedSky):
@@ -20,7 +31,7 @@ class HosekRGB(AbstractFittedSky):
 
     Its spectra are made up, so that they have these colours under the wavelengths
     asked for, which must cover what the eye sees: for pictures in colour, not for
-    light at one wavelength. There is no sun.
+    light at one wavelength. The sun is that of `Hosek`.
     """
 
     ranges: ClassVar = {**RANGES, "wavelength": Range(360.0, 830.0, " nm")}
@@ -70,8 +81,23 @@ class HosekRGB(AbstractFittedSky):
         return jnp.linalg.solve(square, weights.T)
 
     @property
-    def lights(self) -> tuple[()]:
-        return ()
+    def lights(self) -> tuple[Sun]:
+        return self._spectral.lights
+
+    def depth(self, position: Position, direction: Direction) -> Depth:
+        return self._spectral.depth(position, direction)
+
+    @property
+    def _spectral(self) -> Hosek:
+        """The same as spectra, for its sun; beyond 720 nm as there."""
+        return Hosek(
+            self.sun_zenith,
+            self.sun_azimuth,
+            self.turbidity,
+            self.wavelength,
+            self.ground,
+            Clamp(),
+        )
 
     @property
     def _albedo(self) -> Float[Array, "3"]:
