@@ -175,15 +175,19 @@ def test_pictures_in_colour_are_the_spectra_under_the_eye():
 def brightness(sky, directions):
     towards = light_of(sky)
     look = lambda x: sky.parts(x[2], versine(x, towards)) @ sky.basis
-    return jnp.sum(jax.vmap(look)(directions))
+    beams = [jnp.sum(sky.beam(x, HERE)) for x in sky.lights]
+    return sum(beams, jnp.sum(jax.vmap(look)(directions)))
 
 
 @pytest.mark.parametrize("name", [x for x in MODELS if x.values != ("hosek-rgb",)])
 def test_every_number_has_a_gradient_everywhere(name):
     sky, rays = SKIES[name](55 * deg, ground=0.2), hard_directions(55 * deg)
     rays = rays[rays[:, 2] >= 0.0]
-    found = eqx.filter_jit(eqx.filter_grad(brightness))(sky, rays)
-    assert all(np.all(np.isfinite(x)) for x in jax.tree.leaves(found))
+    slopes = eqx.filter_jit(eqx.filter_grad(brightness))
+    for zenith in (0.0, 55.0, 90.0):
+        found = slopes(SKIES[name](zenith * deg, ground=0.2), rays)
+        assert all(np.all(np.isfinite(x)) for x in jax.tree.leaves(found)), zenith
+    found = slopes(sky, rays)
     if name in ("preetham", "hosek"):
         hazier = lambda dt: eqx.tree_at(lambda x: x.turbidity, sky, sky.turbidity + dt)
         more, less = (brightness(hazier(x), rays) for x in (1e-5, -1e-5))

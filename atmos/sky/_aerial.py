@@ -92,8 +92,8 @@ class Air(NamedTuple):
 def haze(turbidity: Number, wavelength: Wavelength) -> Air:
     """The air of a turbidity."""
     um = 1e-3 * wavelength
-    at = lambda knots, rows: jnp.matmul(
-        jnp.asarray(rows, um.dtype), straight(knots, wavelength)
+    at = lambda knots, rows: contract(
+        "...n,nl->...l", jnp.asarray(rows, um.dtype), straight(knots, wavelength)
     )
     squared = 1e-7 * at(*_REFRACTION.T)
     # Lengths are in um where they are raised to powers, so that numbers stay near 1.

@@ -9,6 +9,7 @@ from jaxtyping import Array, Float
 from .. import data
 from ..quantity import Number, Spectral, Wavelength
 from ..reference import matching_functions
+from ..transport import contract
 from ._fitted import straight
 from ._range import Range
 
@@ -41,7 +42,7 @@ def components(wavelength: Wavelength) -> Float[Array, "3 wl"]:
     """S0, S1 and S2; beyond 380 to 780 nm as at the edge."""
     at, values = _components()
     weights = straight(at, wavelength)
-    return jnp.matmul(jnp.asarray(values, wavelength.dtype), weights)
+    return contract("kn,nl->kl", jnp.asarray(values, wavelength.dtype), weights)
 
 
 def mixture(x: Number, y: Number) -> Float[Array, "3"]:
@@ -65,4 +66,4 @@ def spectrum(temperature: Number, wavelength: Wavelength) -> Spectral:
     """Daylight of 1 cd m^-2, in W m^-2 sr^-1 nm^-1."""
     mixed = mixture(*locus(temperature))
     light = jnp.dot(mixed, jnp.asarray(luminances(), mixed.dtype))
-    return jnp.dot(mixed / light, components(wavelength), precision="highest")
+    return contract("k,kl->l", mixed / light, components(wavelength))

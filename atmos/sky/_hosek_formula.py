@@ -11,6 +11,7 @@ from ._hosek_tables import sky_tables
 from ._range import degrees, Range
 
 
+LEAST_ELEVATION = 1e-15  # rad: a cube root has no slope at 0
 RANGES = {"turbidity": Range(1.0, 10.0), "sun_zenith": degrees(0.0, 90.0)}
 
 
@@ -18,7 +19,7 @@ def configured(
     kind: str, turbidity: Number, albedo: Spectral, sun_zenith: Angle
 ) -> tuple[Float[Array, "channel 9"], Float[Array, "channel"]]:
     """The shape's coefficients, and the mean radiance that it multiplies."""
-    elevation = jnp.maximum(0.5 * math.pi - sun_zenith, 0.0)
+    elevation = jnp.maximum(0.5 * math.pi - sun_zenith, LEAST_ELEVATION)
     x = jnp.cbrt(elevation * (2.0 / math.pi))
     bezier = [math.comb(5, k) * x**k * (1.0 - x) ** (5 - k) for k in range(6)]
     weights = jnp.stack(bezier)

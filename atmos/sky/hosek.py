@@ -27,9 +27,10 @@ from ..quantity import (
 from ..spectrum import AbstractSpectrum, Tabulated
 from ._fitted import (
     AbstractFittedSky,
+    angle_between,
     straight,
 )
-from ._hosek_formula import between, configured, RANGES, shape
+from ._hosek_formula import between, configured, LEAST_ELEVATION, RANGES, shape
 from ._hosek_tables import sky_tables, sun_tables
 from ._parameters import set_parameters
 from ._range import AbstractBeyond, Range, REFUSE
@@ -131,7 +132,8 @@ class Hosek(AbstractFittedSky):
 
     def _solar(self, up: Cosine) -> Float[Array, "channel"]:
         """The middle of the disk at its wavelengths, by the elevation of the view."""
-        elevation = 0.5 * math.pi - jnp.arccos(jnp.clip(up, 0.0, 1.0))
+        elevation = 0.5 * math.pi - angle_between(1.0 - jnp.clip(up, 0.0, 1.0))
+        elevation = jnp.maximum(elevation, LEAST_ELEVATION)
         at = jnp.cbrt(elevation * (2.0 / math.pi)) * _PIECES
         piece = jnp.clip(jnp.floor(at), 0.0, _PIECES - 1.0)
         x = elevation - 0.5 * math.pi * (piece / _PIECES) ** 3

@@ -25,6 +25,7 @@ from ..quantity import (
     Wavelength,
 )
 from ..spectrum import AbstractSpectrum, Tabulated
+from ..transport import contract
 from ._aerial import airlight, haze
 from ._daylight import components, DAYLIGHT, luminances, mixture
 from ._fitted import (
@@ -159,9 +160,8 @@ class Preetham(AbstractFittedSky):
 
     @property
     def lights(self) -> tuple[Sun]:
-        irradiance = Tabulated(*_sunlight(self.wavelength.dtype))
-        beyond = (irradiance.values[0], irradiance.values[-1])
-        irradiance = Tabulated(irradiance.knots, irradiance.values, *beyond)
+        knots, values = _sunlight(self.wavelength.dtype)
+        irradiance = Tabulated(knots, values, values[0], values[-1])
         radius = jnp.asarray(SOLAR_RADIUS, self.wavelength.dtype)
         return (Sun.at(self.sun_zenith, self.sun_azimuth, irradiance, radius),)
 
@@ -171,12 +171,12 @@ class Preetham(AbstractFittedSky):
         By molecules, haze, ozone, gases and water vapour.
         """
         del position
-        zenith = jnp.arccos(jnp.clip(direction[2], 0.0, 1.0)) / deg
+        zenith = angle_between(1.0 - jnp.clip(direction[2], 0.0, 1.0)) / deg
         mass = 1.0 / (jnp.cos(zenith * deg) + 0.15 * (93.885 - zenith) ** -1.253)
         um = jnp.clip(self.wavelength, DAYLIGHT.low, DAYLIGHT.high) / 1000.0
         knots, ozone, gas, vapour = _absorption()
         weights = straight(knots, self.wavelength)
-        at = lambda x: jnp.matmul(jnp.asarray(x, um.dtype), weights)
+        at = lambda x: contract("n,nl->l", jnp.asarray(x, um.dtype), weights)
         beta = 0.04608 * self.turbidity - 0.04586
         wet, mixed = _WATER * mass * at(vapour), mass * at(gas)
         return (
