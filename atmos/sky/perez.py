@@ -181,11 +181,13 @@ class Perez(AbstractFittedSky):
         bright = jnp.where(middle, jnp.maximum(bright, 0.2), bright)
         sun, rows = self.sun_zenith, self._row("abcde")
         found = rows[:, 0] + rows[:, 1] * sun + bright * (rows[:, 2] + rows[:, 3] * sun)
-        c, d = rows[2], rows[3]
+        # Overcast skies have formulas of their own, which elsewhere are not to be asked.
+        overcast = self.clearness < _DULL
+        c, d = (jnp.where(overcast, x, 1.0) for x in (rows[2], rows[3]))
         dull_c = jnp.exp((bright * (c[0] + c[1] * sun)) ** c[2]) - c[3]
         dull_d = -jnp.exp(bright * (d[0] + d[1] * sun)) + d[2] + bright * d[3]
         dull = found.at[2].set(dull_c).at[3].set(dull_d)
-        return jnp.where(self.clearness < _DULL, dull, found)
+        return jnp.where(overcast, dull, found)
 
     def relative(self, up: Cosine, turned: Versine) -> Number:
         """The formula: luminance in whatever unit, below 0 if that is."""
