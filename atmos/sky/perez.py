@@ -181,7 +181,7 @@ class Perez(AbstractFittedSky):
         bright = jnp.where(middle, jnp.maximum(bright, 0.2), bright)
         sun, rows = self.sun_zenith, self._row("abcde")
         found = rows[:, 0] + rows[:, 1] * sun + bright * (rows[:, 2] + rows[:, 3] * sun)
-        # Overcast skies have formulas of their own, which elsewhere are not to be asked.
+        # Overcast skies have formulas of their own, not to be asked elsewhere.
         overcast = self.clearness < _DULL
         c, d = (jnp.where(overcast, x, 1.0) for x in (rows[2], rows[3]))
         dull_c = jnp.exp((bright * (c[0] + c[1] * sun)) ** c[2]) - c[3]
