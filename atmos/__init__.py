@@ -4,6 +4,7 @@ from . import (
     bake as bake,
     camera as camera,
     colour as colour,
+    comparison as comparison,
     geometry as geometry,
     image as image,
     light as light,

@@ -11,8 +11,7 @@ from jaxtyping import Array, Float
 from .camera import AbstractCamera
 from .light import Sun
 from .render import Response
-from .solver import SolvedSky
-from .transport import optical_depth
+from .sky import AbstractSky
 
 
 _MET = 25_000  # samples that meet a disk, at least, if it is small
@@ -22,7 +21,7 @@ _TOGETHER = 2**16  # samples that are worked on together
 
 
 def render_disks(
-    sky: SolvedSky, camera: AbstractCamera, response: Response | None = None
+    sky: AbstractSky, camera: AbstractCamera, response: Response | None = None
 ) -> Float[np.ndarray, "height width channel"]:
     """The disks of the lights alone, through the air: to be added to what `render` saw.
 
@@ -35,7 +34,7 @@ def render_disks(
     response = jnp.eye(count, dtype=dtype) if response is None else response
     image = np.zeros((camera.height, camera.width, response.shape[1]), dtype)
     extent = _extent(camera)
-    for light in sky.scene.lights:
+    for light in sky.lights:
         radius = float(light.angular_radius)
         if radius <= 0.0:
             continue
@@ -91,17 +90,17 @@ def _extent(camera: AbstractCamera) -> float:
     return 1.2 * float(jnp.max(jnp.stack(chords)))
 
 
-def _strips(sky: SolvedSky, camera: AbstractCamera, light: Sun):
+def _strips(sky: AbstractSky, camera: AbstractCamera, light: Sun):
     """The zenith angles of the upper and the lower limb, and that of the horizon."""
     altitude = camera.position[2]
-    dip = sky.scene.geometry.dip(altitude, jnp.zeros_like(altitude))
     radius = light.angular_radius
-    return light.zenith - radius, light.zenith + radius, 0.5 * math.pi + dip
+    horizon = 0.5 * math.pi + sky.dip(altitude)
+    return light.zenith - radius, light.zenith + radius, horizon
 
 
 @eqx.filter_jit
 def _depths(
-    sky: SolvedSky, camera: AbstractCamera, light: Sun
+    sky: AbstractSky, camera: AbstractCamera, light: Sun
 ) -> Float[Array, "strip wl"]:
     """The optical depth in front of a disk, strip by strip downwards."""
     top, bottom, horizon = _strips(sky, camera, light)
@@ -110,7 +109,7 @@ def _depths(
     def strip(zenith):
         level = jnp.sin(zenith)
         direction = jnp.stack([level * east, level * north, jnp.cos(zenith)])
-        return optical_depth(sky.scene, camera.position, direction, sky.wavelength)
+        return sky.depth(camera.position, direction)
 
     zeniths = jnp.linspace(top, bottom, _STRIPS, dtype=top.dtype)
     return jax.vmap(strip)(jnp.minimum(zeniths, horizon - 1e-6))
@@ -118,7 +117,7 @@ def _depths(
 
 @eqx.filter_jit
 def _pixels(
-    sky: SolvedSky,
+    sky: AbstractSky,
     camera: AbstractCamera,
     light: Sun,
     depths: Float[Array, "strip wl"],

@@ -17,7 +17,7 @@ import jax.numpy as jnp
 import numpy as np
 import OpenEXR
 from jaxtyping import Array, Float, UInt8
-from PIL import Image, PngImagePlugin
+from PIL import Image, ImageDraw, ImageFont, PngImagePlugin
 
 from .colour import AbstractColourSpace, EFFICACY, has_colour, REC709, response
 
@@ -156,6 +156,22 @@ def write_png(
     with whole_file(path) as part:
         picture = Image.fromarray(np.ascontiguousarray(image))
         picture.save(part, "PNG", pnginfo=texts, compress_level=4)
+
+
+def letter(
+    image: UInt8[Array | np.ndarray, "height width 3"],
+    lines: Mapping[tuple[int, int], str],
+    size: int,
+) -> UInt8[np.ndarray, "height width 3"]:
+    """The picture with lines of black text, each at the column and row it starts at.
+
+    `size` is that of the letters, in pixels.
+    """
+    picture = Image.fromarray(np.ascontiguousarray(image))
+    draw, font = ImageDraw.Draw(picture), ImageFont.load_default(size)
+    for place, text in lines.items():
+        draw.text(place, text, fill=(0, 0, 0), font=font)
+    return np.asarray(picture)
 
 
 def read_exr(path: FilePath) -> Picture:

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from .camera import AbstractCamera
-from .sky import AbstractSky, Panorama
+from .sky import AbstractPanorama, AbstractSky
 
 
 _BLOCK = 2**13  # pixels that are worked on together, so that they stay in the cache
@@ -32,7 +32,7 @@ def render(
     then which share is done. Raises `ValueError` unless the camera stands straight
     above the origin.
     """
-    return _picture(sky, camera, response, progress, Panorama.radiance)
+    return _picture(sky, camera, response, progress, _radiance)
 
 
 def render_stokes(
@@ -47,7 +47,7 @@ def render_stokes(
     In the frame of `atmos.polarisation`: Q counts what vibrates level, whichever way
     the camera is turned. Raises `ValueError` for a sky without polarisation, too.
     """
-    picture = _picture(sky, camera, response, progress, Panorama.stokes)
+    picture = _picture(sky, camera, response, progress, _stokes)
     return jnp.moveaxis(picture, 2, 0)
 
 
@@ -84,19 +84,27 @@ def _picture(
     return jnp.where(jnp.expand_dims(sees, tuple(range(2, image.ndim))), image, 0.0)
 
 
+def _radiance(panorama: AbstractPanorama, zenith: Array, azimuth: Array) -> Array:
+    return panorama.radiance(zenith, azimuth)
+
+
+def _stokes(panorama: AbstractPanorama, zenith: Array, azimuth: Array) -> Array:
+    return panorama.stokes(zenith, azimuth)
+
+
 @eqx.filter_jit
-def _weigh(panorama: Panorama, response: Response) -> Panorama:
+def _weigh(panorama: AbstractPanorama, response: Response) -> AbstractPanorama:
     return panorama.weigh(response)
 
 
 @eqx.filter_jit
-def _finer(panorama: Panorama) -> Panorama:
+def _finer(panorama: AbstractPanorama) -> AbstractPanorama:
     return panorama.finer()
 
 
 @eqx.filter_jit
 def _stretch(
-    panorama: Panorama,
+    panorama: AbstractPanorama,
     zenith: Float[Array, "height #width"],
     azimuth: Float[Array, "#height width"],
     response: Response | None,

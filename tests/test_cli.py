@@ -259,6 +259,41 @@ def test_a_scene_file_to_start_from_is_the_world_asked_for(capsys):
     assert len(parse(none).media) == 2
 
 
+def test_a_fitted_sky_says_what_it_is_and_stands_on_ground(capsys):
+    shape = f"--height {HEIGHT} --wavelength {BANDS} --ground 0.5"
+    model = "--model preetham --turbidity 4 --sun-elevation 30 --sun-azimuth 90"
+    out, err = run(capsys, f"sky {shape} {model}")
+    assert err == "" and "elevation 30.000, azimuth 90.000" in out
+    picture = read_exr("sky.exr")
+    assert picture.attributes["model"] == "--model preetham, --turbidity 4.0"
+    luminance = picture.stack("R", "G", "B") @ COLOUR_SPACES["rec709"].luminance_weights
+    assert luminance[:16].min() > 500.0
+    lower = luminance[16:]
+    np.testing.assert_allclose(lower, lower[0, 0], rtol=1e-5)
+    # The lamp and the sky light the ground, which reflects a half.
+    side = math.pi / HEIGHT
+    rise = np.cos((np.arange(16) + 0.5) * side) * np.sin((np.arange(16) + 0.5) * side)
+    whole = np.sum(luminance[:16] * rise[:, None]) * side * side
+    np.testing.assert_allclose(lower[0, 0], 0.5 / math.pi * whole, rtol=0.02)
+    # East is a quarter to the right of the centre, which looks north.
+    assert np.argmax(luminance.max(0)) in (47, 48)
+
+
+def test_skies_are_compared_as_files_and_by_name(capsys):
+    shape = f"--height {HEIGHT}"
+    cie = "--cie-type 5 --horizontal-illuminance 10000 --ground 0"
+    run(capsys, f"sky --model cie {cie} {shape} --no-preview --output a.exr")
+    more = cie.replace("10000", "12500")
+    run(capsys, f"sky --model cie {more} {shape} --no-preview --output b.exr")
+    out, _ = run(capsys, "compare a.exr b.exr")
+    wanted = "above the horizon: luminance: mean +25.00%, median 25.00%"
+    assert wanted in out and "wrote compare.png" in out
+    out, _ = run(capsys, f"compare a.exr cie {cie} {shape} --output same.png")
+    assert "0.00%, median 0.00%, 95 of 100 0.00%, largest 0.00%" in out
+    with Image.open("compare.png") as page:
+        assert page.size[0] > 3 * 2 * HEIGHT
+
+
 BAD = [
     ("foo", '"foo"', "sky"),
     ("sky --heigth 3", "--heigth", "--height"),
@@ -306,6 +341,25 @@ BAD = [
     ("sky --wavelength 0.5", "--wavelength", "100 to 100000; got '0.5'"),
     ("sky --wavelength 780:380:10", "--wavelength", "FIRST:LAST:STEP"),
     ("sky --wavelength 380:780:1e-9", "--wavelength", "at most 1000000"),
+    ("sky --turbidity 3", "--turbidity", "needs a model"),
+    ("sky --model cie --turbidity 3", "--turbidity", "preetham, hosek"),
+    ("sky --model cie", "cie", "--zenith-luminance, or --horizontal-illuminance"),
+    ("sky --model perez --direct 500", "perez", "--direct and --diffuse, or"),
+    ("sky --model perez --direct 5 --diffuse 0", "--diffuse", "above 0 W m^-2"),
+    ("sky --model perez --direct 9 --diffuse 900", "--direct and --diffuse", "0.6"),
+    ("sky --model preetham --aerosol urban", "--aerosol", "beside models"),
+    ("sky thin.toml --model preetham", "scene", "beside --model; got preetham"),
+    ("sky --model preetham --solver single", "--solver", "beside --model"),
+    ("sky --model preetham --stokes 3", "--stokes", "must be 1 with --model"),
+    ("sky --model preetham --turbidity 9", "--turbidity", "between 2 and 6"),
+    ("sky --model preetham --sun-elevation -3", "--sun-elevation", "above the horizon"),
+    ("sky --model preetham --altitude 5000", "--altitude", "1000 m above the ground"),
+    ("sky --model cie --zenith-luminance 0", "--zenith-luminance", "above 0"),
+    ("sky --model preetham --wavelength 400:800:20", "--wavelength", "780 nm"),
+    ("compare thin.png preetham", "what to compare", "got thin.png"),
+    ("compare none.exr preetham", "none.exr", "No such file"),
+    ("compare preetham cie", "cie", "needs --zenith-luminance"),
+    ("compare a.exr b.exr --sun-elevation 5", "a sun", "not for two files"),
     ("radiance", "SCENE", "requires"),
     ("radiance thin.toml --solver mc", "--solver", '"single"'),
     ("radiance thin.toml --view-zenith 0,190", "--view-zenith", "0 to 180; got '190'"),

@@ -1,4 +1,4 @@
-"""The command line: `atmos sky`, `atmos radiance`, `optical-depth` and `scene`."""
+"""The command line: `atmos sky`, `compare`, `radiance`, `optical-depth`, `scene`."""
 
 import os
 import sys
@@ -6,7 +6,12 @@ import warnings
 from collections.abc import Sequence
 from typing import Any
 
-from . import _picture as _picture, _scene as _scene, _table as _table
+from . import (
+    _compare as _compare,
+    _picture as _picture,
+    _scene as _scene,
+    _table as _table,
+)
 from ._app import app, CycloptsError
 from ._options import SunPosition as SunPosition
 
@@ -27,7 +32,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except OSError as error:
         name = "" if error.filename is None else f"{error.filename}: "
         return _complain(f"{name}{error.strerror or error}")
-    except (CycloptsError, ValueError) as error:
+    except (CycloptsError, ImportError, ValueError) as error:
         return _complain(str(error))
     except MemoryError:
         return _complain("out of memory; ask for fewer pixels or wavelengths")

@@ -14,8 +14,9 @@ HIGHEST = 1e9
 SIGNED = {"allow_leading_hyphen": True}
 WORLD = Group("World", sort_key=1)
 SUN = Group("Sun", sort_key=2)
-CAMERA = Group("Camera", sort_key=3)
-OUTPUT = Group("Output", sort_key=4)
+MODEL = Group("Fitted sky", sort_key=3)
+CAMERA = Group("Camera", sort_key=4)
+OUTPUT = Group("Output", sort_key=5)
 app = App(
     name="atmos",
     help="A physically based sky: pictures, radiances, optical depths.",
@@ -97,7 +98,11 @@ def whole(description: str, low: int, high: int, **more: Any) -> Parameter:
 
 
 def numbers_option(
-    description: str, low: float | int, high: float | int, **more: Any
+    description: str,
+    low: float | int,
+    high: float | int,
+    unset: str = "the scene's",
+    **more: Any,
 ) -> Parameter:
     """An option that is a list of numbers and ranges, all from `low` to `high`."""
 
@@ -106,7 +111,7 @@ def numbers_option(
 
     def show(values):
         if values is None:
-            return "the scene's"
+            return unset
         if len(values) < 9:
             return ",".join(f"{x:g}" for x in values)
         return f"{values[0]:g}:{values[-1]:g}:{values[1] - values[0]:g}"

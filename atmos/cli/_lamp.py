@@ -11,11 +11,9 @@ from jaxtyping import Array, Float
 from ..camera import AbstractCamera
 from ..colour import AbstractColourSpace
 from ..light import Sun
+from ..quantity import Irradiance, Position
 from ..rays import angles
-from ..scene import Scene
-from ..scenefile import dump
-from ..solver import AbstractSolver, SolvedSky
-from ..transport import direct_irradiance
+from ..sky import AbstractSky
 
 
 @dataclasses.dataclass(frozen=True)
@@ -55,7 +53,7 @@ class Lamp:
 
 
 def measure_lamp(
-    sky: SolvedSky,
+    sky: AbstractSky,
     light: Sun,
     camera: AbstractCamera,
     space: AbstractColourSpace,
@@ -63,8 +61,7 @@ def measure_lamp(
 ) -> Lamp:
     """What a light gives the observer; `weights` are those of XYZ, where known."""
     position = camera.position.astype(sky.wavelength.dtype)
-    irradiance = eqx.filter_jit(direct_irradiance)
-    found = irradiance(sky.scene, light, position, sky.wavelength)
+    found = _beam(sky, light, position)
     zenith, azimuth = angles(np.asarray(light.direction))
     values, bands = np.asarray(found, float), np.asarray(sky.wavelength, float)
     if bands.size == 1:
@@ -80,15 +77,16 @@ def measure_lamp(
     return Lamp(90.0 - zenith, azimuth, power, band, float(xyz[1]), colour)
 
 
-def header(
-    scene: Scene, solver: AbstractSolver, wavelength: np.ndarray, lamps: list[Lamp]
-) -> dict[str, Any]:
-    """What the picture shows and how it was made, for the header of the file."""
+@eqx.filter_jit
+def _beam(sky: AbstractSky, light: Sun, position: Position) -> Irradiance:
+    return sky.beam(light, position)
 
-    found = {
+
+def header(wavelength: np.ndarray, lamps: list[Lamp]) -> dict[str, Any]:
+    """What all pictures say of how they were made, for the header of the file."""
+
+    found: dict[str, Any] = {
         "software": f"atmos {importlib.metadata.version('atmos')}",
-        "scene": dump(scene),
-        "solver": str(solver),
         "wavelengths": ",".join(f"{x:g}" for x in wavelength),
     }
     for i, lamp in enumerate(lamps):

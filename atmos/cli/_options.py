@@ -43,15 +43,14 @@ Output = Annotated[
     Path | None, option("The CSV file to write; standard output without it.")
 ]
 Precise = Annotated[bool, option("Calculate in double precision.")]
-Solver = Annotated[
-    Literal["shells", "columns", "shared", "single"],
-    option(
-        "How: shells for all orders of scattering in the round, for any sun; columns "
-        "for all orders, each column of air taken as flat (suns well above the "
-        "horizon); shared for all orders, those after the first roughly (quick, not "
-        "for thick air); single for light that turned once."
-    ),
-]
+SOLVERS = Literal["shells", "columns", "shared", "single"]
+HOW = (
+    "How: shells for all orders of scattering in the round, for any sun; columns for "
+    "all orders, each column of air taken as flat (suns well above the horizon); "
+    "shared for all orders, those after the first roughly (quick, not for thick air); "
+    "single for light that turned once."
+)
+Solver = Annotated[SOLVERS, option(HOW)]
 Bake = Annotated[
     Path | None,
     option(
@@ -244,7 +243,15 @@ class Files:
             name=("--colour-space", "--color-space"),
         ),
     ] = "rec709"
-    wavelength: Wavelengths = tuple(380.0 + 10.0 * i for i in range(41))
+    wavelength: Annotated[
+        tuple[float, ...] | None,
+        numbers_option(
+            "Wavelengths, in nm: numbers, or FIRST:LAST:STEP.",
+            100,
+            1e5,
+            "380:780:10, or up to what a model knows",
+        ),
+    ] = None
     half: Annotated[bool, option("Write 16-bit floats, not 32.")] = False
     sun: Annotated[
         bool,

@@ -63,7 +63,7 @@ def _mars(world: World, sun: Sun) -> Scene:
         if getattr(world, name) is not None:
             refuse(f"--{name}", "is not for --world mars")
     dust = 0.5 if world.optical_depth is None else world.optical_depth
-    return mars(sun, dust, _ground(world.ground))
+    return mars(sun, dust, ground(world.ground))
 
 
 def _earth(world: World, sun: Sun) -> Scene:
@@ -76,17 +76,18 @@ def _earth(world: World, sun: Sun) -> Scene:
     if world.aerosol == "none":
         if given:
             refuse(given[0], "must not stand beside --aerosol none")
-        clear = earth(sun, None, column, _ground(world.ground))
+        clear = earth(sun, None, column, ground(world.ground))
         return dataclasses.replace(clear, media=clear.media[:2])
     if len(given) > 1:
         refuse("--visibility", "must not stand beside --optical-depth")
     name = (world.aerosol or "continental_clean").replace("-", "_")
     with about({"name": "--aerosol", "visibility": "--visibility"}):
         aerosol = opac(name, world.optical_depth, world.visibility)
-    return earth(sun, aerosol, column, _ground(world.ground))
+    return earth(sun, aerosol, column, ground(world.ground))
 
 
-def _ground(text: str | None) -> AbstractSpectrum | None:
+def ground(text: str | None) -> AbstractSpectrum | None:
+    """The albedo of a ground: a name or a number; None for that of the world."""
     if text is None:
         return None
     try:

@@ -15,6 +15,7 @@ from ..phase import AbstractPhaseFunction
 from ..polarisation import vibration_at
 from ..quantity import Angle, deg, km, Wavelength
 from ..transport import contract
+from ._base import AbstractPanorama
 
 
 # Rings keep this far off the horizon, so that rounding leaves no doubt on which side.
@@ -125,8 +126,8 @@ def _matrix(
     return jnp.sum(jnp.where(taken, weights[:, None, :], 0.0), -1)
 
 
-class Panorama(eqx.Module):
-    """The light that arrives at one place from all directions.
+class Panorama(AbstractPanorama):
+    """The light that arrives at one place, as a table of directions.
 
     For each light, `table` holds the radiance on a grid of directions, in parts: one
     for each phase function, which is put on only when looked up and so stays exact, and

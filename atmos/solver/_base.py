@@ -13,8 +13,12 @@ from ..light import Sun
 from ..phase import Isotropic
 from ..polarisation import vibration
 from ..quantity import (
+    Angle,
     as_float,
+    Depth,
     Direction,
+    Irradiance,
+    Length,
     Number,
     Position,
     Radiance,
@@ -24,6 +28,7 @@ from ..quantity import (
 )
 from ..scene import Scene
 from ..sky import AbstractSky, fine_enough, Grid, Panorama, Resolution
+from ..transport import direct_irradiance, optical_depth
 
 
 class AbstractSolver(eqx.Module):
@@ -137,6 +142,19 @@ class SolvedSky(AbstractSky):
         lowest = max((_known(x.zenith + dip) for x in self.scene.lights), default=0.0)
         size = fine_enough(_known(position[2]), lowest, self.solver.around)
         return _tabulate(self, position, size)
+
+    @property
+    def lights(self) -> tuple[Sun, ...]:
+        return self.scene.lights
+
+    def depth(self, position: Position, direction: Direction) -> Depth:
+        return optical_depth(self.scene, position, direction, self.wavelength)
+
+    def dip(self, altitude: Length) -> Angle:
+        return self.scene.geometry.dip(altitude, jnp.zeros_like(altitude))
+
+    def beam(self, light: Sun, position: Position) -> Irradiance:
+        return direct_irradiance(self.scene, light, position, self.wavelength)
 
     def _edges(self, altitude):
         """How far the horizon lies below level; the zenith angle where air begins."""
