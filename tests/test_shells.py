@@ -138,7 +138,7 @@ def test_a_huge_planet_is_flat():
 
 def test_what_is_not_absorbed_leaves():
     """White air over white ground: all light that meets either flies out at the top."""
-    field = solve(numbers(depth=0.5, haze=0.0, ground=1.0), SHELLS, NM).prepared
+    field = solve(numbers(depth=0.5, haze=0.0, ground=1.0), SHELLS, NM).prepared.field
     zenith = np.asarray(field.suns.zeniths())
     up = np.asarray(field.up)[:, -1, 0] * np.exp(np.asarray(field.reference)[:, -1])
     leaves = 2.0 * CubicSpline(zenith, up * np.sin(zenith)).integrate(0.0, math.pi)
@@ -189,8 +189,8 @@ def test_what_is_not_round_or_not_layered_is_refused():
 
 def test_too_few_orders_are_refused():
     few = Shells(**SIZES, orders=2)
-    with pytest.raises(Exception, match="within 2 `orders`"):
-        jax.block_until_ready(solve(numbers(), few, NM).prepared)
+    with pytest.raises(ValueError, match="within 2 `orders`; what is missing is 0"):
+        solve(numbers(), few, NM)
 
 
 def test_a_fixed_point_solves_its_equations():

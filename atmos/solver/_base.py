@@ -60,6 +60,13 @@ class AbstractSolver(eqx.Module):
     def prepare(self, scene: Scene, wavelength: Wavelength) -> PyTree[Any]:
         """What can be worked out before the first look; None if nothing."""
 
+    def found(self, prepared: PyTree[Any]) -> PyTree[Any]:
+        """What `prepare` made, if it is good enough; raises `ValueError` otherwise.
+
+        Where that hangs on numbers yet to be traced, it raises when it is run.
+        """
+        return prepared
+
     @abc.abstractmethod
     def scattered(
         self,
@@ -277,7 +284,7 @@ def solve(scene: Scene, solver: AbstractSolver, wavelength: ArrayLike) -> Solved
     the scene covers them; and for a scene that the solver does not hold for.
     """
     scene, nm = admit(scene, solver, wavelength)
-    prepared = _prepare(solver, solver.baked(scene), nm)
+    prepared = solver.found(_prepare(solver, solver.baked(scene), nm))
     return SolvedSky(scene=scene, solver=solver, wavelength=nm, prepared=prepared)
 
 

@@ -5,12 +5,13 @@ from typing import ClassVar
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+from jax.core import Tracer
 from jaxtyping import Array, Float
 
 from ..geometry import Flat
 from ..light import Sun
 from ..optics import check_layered, layers, Mixture, mixture
-from ..quantity import Direction, Position, Wavelength
+from ..quantity import Direction, Number, Position, Wavelength
 from ..scene import Scene
 from ..transport import contract
 from ._base import AbstractSolver
@@ -25,6 +26,13 @@ from ._sweep import Light, Sweep
 from .single_scattering import SingleScattering
 
 
+class Solution(eqx.Module):
+    """Diffuse light, and what share of its first order is missing in the whole."""
+
+    field: Field
+    error: Number
+
+
 class Shells(AbstractSolver):
     """All orders of scattering in a round world, by day, in twilight and from space.
 
@@ -35,12 +43,13 @@ class Shells(AbstractSolver):
     below `degrees`, for `suns` zenith angles of the sun, relative to how bright it is
     there: it serves every sun and every place. Orders are added up by solving for their
     sum, until it is right to `tolerance`; a solution that is not after `orders` steps
-    raises when it is run. Phase functions are without their forward peaks (delta-M,
+    is refused. Phase functions are without their forward peaks (delta-M,
     Wiscombe 1977), but for light that turned once, which is added with them (Nakajima
     and Tanaka 1988). A line of sight takes `nodes` places in each of `pieces` pieces.
 
     Raises `ValueError` for a flat world, where a medium does not depend on altitude
-    alone, and where media have more edges than there are layers.
+    alone, where media have more edges than there are layers, and where `tolerance` is
+    not reached.
     """
 
     around: ClassVar[int] = 17
@@ -65,7 +74,7 @@ class Shells(AbstractSolver):
     def baked(self, scene: Scene) -> Scene:
         return dataclasses.replace(scene, lights=())
 
-    def prepare(self, scene: Scene, wavelength: Wavelength) -> Field:
+    def prepare(self, scene: Scene, wavelength: Wavelength) -> Solution:
         mixed = mixture(scene, wavelength, self.degrees + 1).truncated()
         start, once = self._start(scene, wavelength, mixed)
 
@@ -85,10 +94,8 @@ class Shells(AbstractSolver):
         light, error = fixed_point(
             lambda x: sweep.carry(x.moments), first, self.tolerance, self.orders
         )
-        rule = f"`tolerance` must be reached within {self.orders} `orders`."
-        light = eqx.error_if(light, ~jnp.all(error <= self.tolerance), rule)
         by_sun = lambda x: jnp.moveaxis(x, -2, 0)
-        return Field(
+        field = Field(
             mixed,
             start.rays.altitude,
             start.suns.zenith,
@@ -97,6 +104,16 @@ class Shells(AbstractSolver):
             by_sun(light.down),
             reference.T,
         )
+        return Solution(field, jnp.max(error, initial=0.0))
+
+    def found(self, prepared: Solution) -> Solution:
+        rule = f"`tolerance` must be reached within {self.orders} `orders`"
+        error, enough = prepared.error, prepared.error <= self.tolerance
+        if isinstance(error, Tracer):
+            return eqx.error_if(prepared, ~enough, f"{rule}.")
+        if not enough:
+            raise ValueError(f"{rule}; what is missing is {float(error):.2g}.")
+        return prepared
 
     def _start(
         self, scene: Scene, wavelength: Wavelength, mixed: Mixture
@@ -129,7 +146,7 @@ class Shells(AbstractSolver):
 
     def scattered(
         self,
-        prepared: Field,
+        prepared: Solution,
         scene: Scene,
         light: Sun,
         wavelength: Wavelength,
@@ -137,9 +154,9 @@ class Shells(AbstractSolver):
         direction: Direction,
     ) -> Float[Array, "part wl"]:
         look = scene, light, wavelength, position, direction
-        extinction = prepared.mixture.extinction
+        extinction = prepared.field.mixture.extinction
         once = self.single.march(scene, extinction, *look[1:])
-        more = prepared.gather(*look, pieces=self.pieces, nodes=self.nodes)
+        more = prepared.field.gather(*look, pieces=self.pieces, nodes=self.nodes)
         return once.at[-1:].add(more)
 
 
