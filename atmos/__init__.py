@@ -5,6 +5,7 @@ from . import (
     camera as camera,
     colour as colour,
     geometry as geometry,
+    gridfile as gridfile,
     image as image,
     light as light,
     medium as medium,

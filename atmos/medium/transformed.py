@@ -34,6 +34,9 @@ class Transformed(AbstractLocal):
                     "`matrix` must be finite and have an inverse; got "
                     f"{np.asarray(self.matrix).tolist()}."
                 )
+        if not isinstance(self.offset, Tracer):
+            if not np.all(np.isfinite(self.offset)):
+                raise ValueError(f"`offset` must be finite; got {self.offset}.")
 
     def density(self, point: Point) -> Number:
         return self.of.density(self._back(point))
