@@ -6,6 +6,7 @@ from ..geometry import AbstractPath, Point
 from ..quantity import as_float, Number, Position
 from ._base import AbstractLocal, check_above_zero, check_not_negative
 from ._bounds import through_box
+from ._trilinear import trilinear
 
 
 class Grid(AbstractLocal):
@@ -30,10 +31,12 @@ class Grid(AbstractLocal):
             check_above_zero("upper - lower", size)
 
     def density(self, point: Point) -> Number:
-        share = (point.position - self.lower) / (self.upper - self.lower)
-        inside = jnp.all((share >= 0.0) & (share <= 1.0))
-        cell = share * jnp.asarray(self.values.shape, share.dtype) - 0.5
-        return jnp.where(inside, _trilinear(self.values, cell), 0.0)
+        x, y, z = (point.position - self.lower) / (self.upper - self.lower)
+        inside = (x >= 0.0) & (x <= 1.0) & (y >= 0.0) & (y <= 1.0)
+        inside = inside & (z >= 0.0) & (z <= 1.0)
+        sizes = zip(self.values.shape, (x, y, z), strict=True)
+        value = trilinear(self.values, *(n * share - 0.5 for n, share in sizes))
+        return jnp.where(inside, value, 0.0)
 
     def breaks(self, path: AbstractPath) -> Float[Array, "2"]:
         return through_box(path, self.lower, self.upper)
@@ -41,23 +44,3 @@ class Grid(AbstractLocal):
     @property
     def box(self) -> tuple[Position, Position]:
         return self.lower, self.upper
-
-
-def _trilinear(values: Float[Array, "nx ny nz"], cell: Float[Array, "3"]) -> Number:
-    """The value at a place counted in cells; beyond the edge that of the edge."""
-    size = values.shape
-    last = jnp.array([max(n - 2, 0) for n in size], jnp.int32)
-    first = jnp.clip(jnp.int32(jnp.floor(cell)), 0, last)
-    part = jnp.clip(cell - first.astype(cell.dtype), 0.0, 1.0)
-    strides = size[1] * size[2], size[2], 1
-    steps = [stride if n > 1 else 0 for stride, n in zip(strides, size, strict=True)]
-    start = first[0] * strides[0] + first[1] * strides[1] + first[2]
-    corners = [(i, j, k) for i in (0, 1) for j in (0, 1) for k in (0, 1)]
-    offsets = jnp.array(
-        [sum(a * b for a, b in zip(x, steps, strict=True)) for x in corners], jnp.int32
-    )
-    found = values.reshape(-1).at[start + offsets].get(mode="promise_in_bounds")
-    found = found.reshape(2, 2, 2)
-    found = found[0] + part[0] * (found[1] - found[0])
-    found = found[0] + part[1] * (found[1] - found[0])
-    return found[0] + part[2] * (found[1] - found[0])

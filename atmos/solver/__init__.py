@@ -4,6 +4,17 @@ from ._base import (
     solve as solve,
     SolvedSky as SolvedSky,
 )
+from ._shadows import (
+    AbstractShadows as AbstractShadows,
+    ShadowCache as ShadowCache,
+    ShadowRays as ShadowRays,
+)
+from ._steps import (
+    AbstractSteps as AbstractSteps,
+    Adaptive as Adaptive,
+    Fixed as Fixed,
+    Jittered as Jittered,
+)
 from .columns import Columns as Columns, Fluxes as Fluxes
 from .path_tracing import (
     Estimate as Estimate,
@@ -11,5 +22,6 @@ from .path_tracing import (
     PathTracing as PathTracing,
     Tally as Tally,
 )
+from .ray_marching import RayMarching as RayMarching
 from .shared import Shared as Shared
 from .single_scattering import QUICK as QUICK, SingleScattering as SingleScattering
