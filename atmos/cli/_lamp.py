@@ -1,10 +1,12 @@
 """The sun as a lamp for other renderers; what the header of a picture says."""
 
+import contextlib
 import dataclasses
 import importlib.metadata
 from typing import Any
 
 import equinox as eqx
+import jax
 import numpy as np
 from jaxtyping import Array, Float
 
@@ -16,6 +18,9 @@ from ..scene import Scene
 from ..scenefile import dump
 from ..solver import AbstractSolver, SolvedSky
 from ..transport import direct_irradiance
+
+
+_MOST_NUMBERS = 100_000  # in the header of a picture
 
 
 @dataclasses.dataclass(frozen=True)
@@ -87,10 +92,13 @@ def header(
 
     found = {
         "software": f"atmos {importlib.metadata.version('atmos')}",
-        "scene": dump(scene),
         "solver": str(solver),
         "wavelengths": ",".join(f"{x:g}" for x in wavelength),
     }
+    # A cloud of millions of cells is no text; some things have no words.
+    if sum(x.size for x in jax.tree.leaves(scene)) <= _MOST_NUMBERS:
+        with contextlib.suppress(ValueError):
+            found["scene"] = dump(scene)
     for i, lamp in enumerate(lamps):
         found |= lamp.attributes("sun" if i == 0 else f"sun{i + 1}")
     return found

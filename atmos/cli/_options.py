@@ -44,11 +44,12 @@ Output = Annotated[
 ]
 Precise = Annotated[bool, option("Calculate in double precision.")]
 Solver = Annotated[
-    Literal["columns", "shared", "single"],
+    Literal["columns", "shared", "single", "march"],
     option(
         "How: columns for all orders of scattering, each column of air taken as flat "
         "(suns well above the horizon); shared for all orders, those after the first "
-        "roughly (quick, not for thick air); single for light that turned once."
+        "roughly (quick, not for thick air); single for light that turned once; march "
+        "for that in clouds, smoke and fire, by steps along every ray."
     ),
 ]
 Bake = Annotated[

@@ -1,7 +1,9 @@
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import os
+from collections.abc import Iterator
 from contextvars import ContextVar
 from typing import Annotated
 
@@ -9,7 +11,7 @@ import msgspec
 
 from .. import gridfile, medium
 from ._base import Above0, AtLeast0, Kind
-from ._errors import refuse, under
+from ._errors import under
 
 
 # Where files that a scene names are looked for.
@@ -95,6 +97,15 @@ class Grid(Kind, tag="grid"):
     upper: Place
 
 
+@contextlib.contextmanager
+def located(name: str) -> Iterator[str]:
+    """Where a file is that a scene names; that it cannot be read is a `ValueError`."""
+    try:
+        yield os.path.join(FOLDER.get(), name)
+    except OSError as error:
+        raise ValueError(f"{name}: cannot be read: {error.strerror}.") from error
+
+
 class File(Kind, tag="file"):
     """The grid of a name in an OpenVDB file or a NumPy archive, times `factor`."""
 
@@ -103,12 +114,8 @@ class File(Kind, tag="file"):
     factor: AtLeast0 = 1.0
 
     def build(self) -> medium.AbstractProfile:
-        path = os.path.join(FOLDER.get(), self.file)
-        with under("file"):
-            try:
-                found = gridfile.load(path, self.grid)
-            except OSError as error:
-                refuse("", f"cannot be read: {error.strerror}", self.file)
+        with under("file"), located(self.file) as path:
+            found = gridfile.load(path, self.grid)
         return found if self.factor == 1.0 else _scaled(found, self.factor)
 
 
@@ -124,7 +131,11 @@ class Transformed(Kind, tag="transformed"):
 
     makes = medium.Transformed
     of: Profile
-    matrix: tuple[Place, Place, Place] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    matrix: tuple[Place, Place, Place] = (
+        (1.0, 0.0, 0.0),
+        (0.0, 1.0, 0.0),
+        (0.0, 0.0, 1.0),
+    )
     offset: Place = (0.0, 0.0, 0.0)
 
 
@@ -132,6 +143,13 @@ class Product(Kind, tag="product"):
     makes = medium.Product
     one: Profile
     other: Profile
+
+
+class Blackbody(Kind, tag="blackbody"):
+    """What is absorbed shines, as warm as a profile says, in K."""
+
+    makes = medium.Thermal
+    temperature: Profile
 
 
 Profile = (
