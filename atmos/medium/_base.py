@@ -48,6 +48,10 @@ class AbstractProfile(eqx.Module):
         """
         return None
 
+    def most(self, lower: Position, upper: Position) -> Number:
+        """What the density does not exceed anywhere in a box above the ground."""
+        return jnp.ones_like(lower[0])
+
 
 class AbstractLocal(AbstractProfile):
     """A density that depends on the place."""

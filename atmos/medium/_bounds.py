@@ -4,7 +4,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..geometry import AbstractPath
-from ..quantity import Length, Position
+from ..quantity import Length, Number, Position
 
 
 def through_box(
@@ -32,3 +32,12 @@ def through_sphere(
     hit = squared > 0.0
     half = jnp.where(hit, jnp.sqrt(jnp.where(hit, squared, 1.0)), 0.0)
     return jnp.stack([middle - half, middle + half])
+
+
+def sphere_meets(
+    centre: Position, radius: Length, lower: Position, upper: Position
+) -> Number:
+    """1 if a sphere and a box have a place in common, 0 otherwise."""
+    apart = centre - jnp.clip(centre, lower, upper)
+    meets = jnp.dot(apart, apart) <= radius * radius * (1.0 + 1e-5)
+    return jnp.where(meets, jnp.ones_like(radius), 0.0)

@@ -1,4 +1,5 @@
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from ..quantity import Number
@@ -25,3 +26,41 @@ def trilinear(
         return low + parts[axis] * (between(index + steps[axis], axis + 1) - low)
 
     return between(index, 0)
+
+
+# Windows along each axis that cover a range of cells.
+_WINDOWS = 3
+
+
+def window_most(
+    values: Float[Array, "nx ny nz"],
+    low: Float[Array, "3"],
+    high: Float[Array, "3"],
+) -> Number:
+    """No less than any value of `trilinear` between two places.
+
+    A few cubes of cells, of the size 1, 2, 4, ... that is about right, cover the box.
+    """
+    last = jnp.array(values.shape, jnp.int32) - 1
+    first = jnp.clip(jnp.int32(jnp.floor(low)), 0, last)
+    count = jnp.clip(jnp.int32(jnp.floor(high)) + 1, 0, last) + 1 - first
+    longest = jnp.max(count)
+    windows = np.arange(_WINDOWS)
+    steps = np.stack(np.meshgrid(*[windows] * 3, indexing="ij"), -1).reshape(-1, 3)
+    found, done, side = jnp.zeros_like(low[0]), jnp.array(False), 1
+    while True:
+        # Along an axis no farther than the last window has to begin.
+        starts = jnp.minimum(jnp.array(steps * side, jnp.int32), (count - side)[None])
+        places = first[None] + jnp.maximum(starts, 0)
+        most = jnp.max(values[places[:, 0], places[:, 1], places[:, 2]])
+        fits = longest <= side * _WINDOWS
+        found = jnp.where(fits & ~done, most, found)
+        done = done | fits
+        if side * _WINDOWS >= max(values.shape):
+            return found
+        for axis in range(3):
+            ends = np.minimum(
+                np.arange(values.shape[axis]) + side, values.shape[axis] - 1
+            )
+            values = jnp.maximum(values, jnp.take(values, ends, axis))
+        side *= 2

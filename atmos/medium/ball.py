@@ -5,7 +5,7 @@ from jaxtyping import Array, Float
 from ..geometry import AbstractPath, Point
 from ..quantity import as_float, Length, Number, Position
 from ._base import AbstractLocal, check_above_zero
-from ._bounds import through_sphere
+from ._bounds import sphere_meets, through_sphere
 
 
 class Ball(AbstractLocal):
@@ -24,6 +24,9 @@ class Ball(AbstractLocal):
 
     def breaks(self, path: AbstractPath) -> Float[Array, "2"]:
         return through_sphere(path, self.centre, self.radius)
+
+    def most(self, lower: Position, upper: Position) -> Number:
+        return sphere_meets(self.centre, self.radius, lower, upper)
 
     @property
     def box(self) -> tuple[Position, Position]:

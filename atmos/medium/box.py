@@ -26,6 +26,10 @@ class Box(AbstractLocal):
     def breaks(self, path: AbstractPath) -> Float[Array, "2"]:
         return through_box(path, self.lower, self.upper)
 
+    def most(self, lower: Position, upper: Position) -> Number:
+        meets = jnp.all((lower <= self.upper) & (upper >= self.lower))
+        return jnp.where(meets, jnp.ones_like(lower[0]), 0.0)
+
     @property
     def box(self) -> tuple[Position, Position]:
         return self.lower, self.upper

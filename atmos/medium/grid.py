@@ -6,7 +6,7 @@ from ..geometry import AbstractPath, Point
 from ..quantity import as_float, Number, Position
 from ._base import AbstractLocal, check_above_zero, check_not_negative
 from ._bounds import through_box
-from ._trilinear import trilinear
+from ._trilinear import trilinear, window_most
 
 
 class Grid(AbstractLocal):
@@ -40,6 +40,14 @@ class Grid(AbstractLocal):
 
     def breaks(self, path: AbstractPath) -> Float[Array, "2"]:
         return through_box(path, self.lower, self.upper)
+
+    def most(self, lower: Position, upper: Position) -> Number:
+        # A little wider than it is: what rounding moves into the box is in it.
+        size = (self.upper - self.lower) / jnp.array(self.values.shape, lower.dtype)
+        low, high = (lower - self.lower) / size - 0.51, (upper - self.lower) / size
+        meets = jnp.all((lower <= self.upper) & (upper >= self.lower))
+        most = window_most(self.values, low, high - 0.49)
+        return jnp.where(meets, most, 0.0)
 
     @property
     def box(self) -> tuple[Position, Position]:

@@ -25,6 +25,9 @@ class Product(AbstractProfile):
             jnp.concatenate([self.one.breaks(path), self.other.breaks(path)])
         )
 
+    def most(self, lower: Position, upper: Position) -> Number:
+        return self.one.most(lower, upper) * self.other.most(lower, upper)
+
     @property
     def layered(self) -> bool:
         return self.one.layered and self.other.layered

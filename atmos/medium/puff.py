@@ -5,7 +5,7 @@ from jaxtyping import Array, Float
 from ..geometry import AbstractPath, Point
 from ..quantity import as_float, Length, Number, Position
 from ._base import AbstractLocal, check_above_zero, check_not_negative
-from ._bounds import through_sphere
+from ._bounds import sphere_meets, through_sphere
 from ._noise import fractal
 
 
@@ -46,6 +46,9 @@ class Puff(AbstractLocal):
 
     def breaks(self, path: AbstractPath) -> Float[Array, "2"]:
         return through_sphere(path, self.centre, self._reach)
+
+    def most(self, lower: Position, upper: Position) -> Number:
+        return sphere_meets(self.centre, self._reach, lower, upper)
 
     @property
     def box(self) -> tuple[Position, Position]:

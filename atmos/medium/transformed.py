@@ -55,6 +55,15 @@ class Transformed(AbstractLocal):
         half = _times(jnp.abs(self.matrix), 0.5 * (upper - lower))
         return middle - half, middle + half
 
+    def most(self, lower: Position, upper: Position) -> Number:
+        middle = self._inverse(0.5 * (lower + upper) - self.offset)
+        corners = [jnp.stack([upper[0], upper[1], z]) for z in (lower[2], upper[2])]
+        corners += [jnp.stack([upper[0], lower[1], z]) for z in (lower[2], upper[2])]
+        # The other corners of the box lie opposite of these.
+        apart = [jnp.abs(self._inverse(x - self.offset) - middle) for x in corners]
+        half = jnp.max(jnp.stack(apart), 0)
+        return self.of.most(middle - half, middle + half)
+
     def _back(self, point: Point) -> Point:
         position = self._inverse(point.position - self.offset)
         return Point(position, point.altitude, point.up)

@@ -15,13 +15,15 @@ from ._steps import (
     Fixed as Fixed,
     Jittered as Jittered,
 )
-from .columns import Columns as Columns, Fluxes as Fluxes
-from .path_tracing import (
+from ._tally import (
+    AbstractTracing as AbstractTracing,
     Estimate as Estimate,
     estimate as estimate,
-    PathTracing as PathTracing,
     Tally as Tally,
 )
+from .columns import Columns as Columns, Fluxes as Fluxes
+from .path_tracing import PathTracing as PathTracing
 from .ray_marching import RayMarching as RayMarching
 from .shared import Shared as Shared
 from .single_scattering import QUICK as QUICK, SingleScattering as SingleScattering
+from .volume_tracing import VolumeTracing as VolumeTracing

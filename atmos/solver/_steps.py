@@ -14,6 +14,7 @@ from ..quantity import as_float, Depth, Length, Number, Radiance
 from ..scene import Scene
 from ..transport import densities
 from ._flight import share
+from ._look import of_look
 
 
 # Beyond this optical depth nothing is seen: 2e-9 of what comes from nearer.
@@ -125,11 +126,7 @@ class Jittered(AbstractSteps):
         _check_count(self.count)
 
     def march(self, ray: Ray) -> Found:
-        looks = jnp.concatenate([ray.path.start.position, ray.path.direction])
-        bits = jax.lax.bitcast_convert_type(looks.astype(jnp.float32), jnp.uint32)
-        key, _ = jax.lax.scan(
-            lambda key, x: (jax.random.fold_in(key, x), None), self.key, bits
-        )
+        key = of_look(self.key, ray.path.start.position, ray.path.direction)
 
         def at(i, begin, end):
             u = jax.random.uniform(jax.random.fold_in(key, i), (), begin.dtype)
@@ -244,6 +241,6 @@ def cut(
     edges = jnp.sort(jnp.concatenate(edges))
     if not shares or edges.shape[0] < 2:
         return edges
-    share = sum(jnp.interp(edges, *x) for x in shares)
+    share = jnp.sum(jnp.stack([jnp.interp(edges, *x) for x in shares]), 0)
     even = jnp.arange(1, count, dtype=far.dtype) / count * share[-1]
     return jnp.sort(jnp.concatenate([edges, jnp.interp(even, share, edges)]))
