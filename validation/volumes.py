@@ -1,7 +1,7 @@
 """Light in clouds traced by null collisions, against tables and against Mitsuba.
 
-The tables are of slabs of Henyey and Greenstein's lobes, reflected and transmitted flux
-over depth, albedo, asymmetry and angle of the sun (DISORT with 128 streams); a slab is a
+The tables are of slabs with the lobes of Henyey and Greenstein: what is reflected and
+transmitted over depth, albedo, asymmetry and sun (DISORT with 128 streams); a slab is a
 box much wider than high here. A z-score is an error in standard errors.
 
 Mitsuba's `volpath` renders the same cloud of 64 cubed cells, lit by one sun, with an
@@ -32,7 +32,7 @@ from .claim import Claim, main
 
 WIDE = 1e5  # how much wider than high a slab is
 LOOKS = 1024  # directions for each flux
-SIZE, LOOKS_A_PIXEL = 12, 96
+SIZE, LOOKS_A_PIXEL = 16, 256
 
 
 def claims(arguments: argparse.Namespace) -> Iterator[Claim]:
