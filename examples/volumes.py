@@ -40,7 +40,7 @@ def sampled(profile: AbstractProfile, lower, upper, cells: int, times=1.0) -> Gr
 
 def beam(cells):
     """Sunlight falls through a hole in a roof into smoke."""
-    far, hole = 40.0, 0.5
+    far, hole = 2000.0, 0.5
     sheets = [
         ([-far, -far], [far, -hole]),
         ([-far, hole], [far, far]),
