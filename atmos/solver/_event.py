@@ -15,6 +15,7 @@ from ..transport import densities
 from ._collision import phase, turn
 from ._directions import basis
 from ._majorants import cross, Crossing, fly, Majorants
+from ._steps import total
 from ._walk import weigh
 
 
@@ -110,7 +111,7 @@ def proceed(quest: Quest, trip: Trip) -> Trip:
     place = ray.start + ray.at * ray.direction
     point = scene.geometry.locate(place)
     here = densities(scene, point)
-    extinction = jnp.sum(here[:, None] * quest.extinction, 0)
+    extinction = total(here, quest.extinction)
     bound = jnp.where(met, bound, 1.0)
     real = jnp.clip(extinction / bound, 0.0, 1.0)
 
@@ -119,14 +120,14 @@ def proceed(quest: Quest, trip: Trip) -> Trip:
     faint = jnp.max(beam, initial=0.0) < _FAINT * trip.bright
     beam = jnp.where(faint, jnp.where(u[1] < 0.5, 2.0 * beam, 0.0), beam)
     arrives = trip.beaming & ~met & ~trip.grounded
-    total = trip.total + jnp.where(arrives, trip.beam, 0.0)
+    found = trip.total + jnp.where(arrives, trip.beam, 0.0)
 
     path = ~trip.beaming & (trip.left > 0)
-    total += jnp.where(path & met, trip.weight * _shines(quest, point, here) / bound, 0)
+    found += jnp.where(path & met, trip.weight * _shines(quest, point, here) / bound, 0)
     turns = path & met & (u[1] < real[hero])
     lands = path & ~met & trip.grounded
     mixture = here[:, None] * quest.scattering
-    scattering = jnp.sum(mixture, 0)
+    scattering = total(here, quest.scattering)
     mixture = mixture / jnp.where(scattering > 0.0, scattering, 1.0)[None]
     ground = jnp.broadcast_to(scene.ground.evaluate(nm), nm.shape)
     seen = jnp.where(turns, scattering / bound, 1.0 - real)
@@ -204,7 +205,7 @@ def proceed(quest: Quest, trip: Trip) -> Trip:
         ratio=jnp.where(ended, one, ratio),
         beam=beam,
         bright=jnp.where(bent, jnp.max(beam, initial=0.0), trip.bright),
-        total=total,
+        total=found,
     )
 
 

@@ -74,7 +74,7 @@ class Ray(eqx.Module):
 
     def radiance(self, found: Found) -> Radiance:
         """What is seen in all, of what was passed and of what is behind."""
-        own = jnp.sum(self.weights * found.light, 0)
+        own = added(self.weights * found.light)
         return own + jnp.exp(-self.depth(found)) * self.behind
 
 
@@ -199,18 +199,29 @@ def _difference(
     ray: Ray, found: Found, one: Found, two: Found, bright: Radiance
 ) -> Radiance:
     """How much two ways of going on differ, in what they see and what they hide."""
-    own = jnp.abs(jnp.sum(ray.weights * (one.light - two.light), 0))
-    seen = jnp.sum(ray.weights * found.light, 0)
+    own = jnp.abs(added(ray.weights * (one.light - two.light)))
+    seen = added(ray.weights * found.light)
     hides = jnp.abs(jnp.expm1(ray.depth(two) - ray.depth(one)))
     return own + jnp.minimum(hides, 1.0) * jnp.maximum(bright - seen, 0.0)
 
 
 def total(
-    passed: Float[Array, "medium"], extinction: Float[Array, "medium wl"]
-) -> Depth:
-    """The optical depth of so much of each medium."""
-    # A sum, not a matrix product: that would be a step of its own in every step.
-    return jnp.sum(passed[:, None] * extinction, 0)
+    amount: Float[Array, "medium"], each: Float[Array, "medium wl"]
+) -> Float[Array, "wl"]:
+    """What so much of each medium does: a product with a matrix, medium by medium.
+
+    As a product it would be a step of its own in every step; and as a sum over an axis,
+    in batches of thousands, XLA's compiler for CPUs (JAX 0.10.2) gets it wrong.
+    """
+    return added(amount[:, None] * each)
+
+
+def added(rows: Float[Array, "row wl"]) -> Float[Array, "wl"]:
+    """The sum of some rows, one after the other."""
+    found = jnp.zeros_like(rows, shape=rows.shape[1:])
+    for row in rows:
+        found = found + row
+    return found
 
 
 def _check_count(count: int) -> None:
