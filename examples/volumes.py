@@ -23,6 +23,7 @@ from atmos.medium import (
 )
 from atmos.phase import HenyeyGreenstein
 from atmos.solver import Fixed, RayMarching, ShadowCache, ShadowRays, VolumeTracing
+from atmos.spectrum import Constant
 
 
 WAVELENGTH = jnp.linspace(400.0, 700.0, 7, dtype=jnp.float32)
@@ -32,7 +33,7 @@ def sampled(profile: AbstractProfile, lower, upper, cells: int, times=1.0) -> Gr
     """A profile in the middles of cells: cheaper to march through than noise."""
     lower, upper = np.asarray(lower), np.asarray(upper)
     places = (np.indices((cells,) * 3).reshape(3, -1).T + 0.5) / cells
-    places = jnp.asarray(lower + places * (upper - lower), jnp.float32)
+    places = jnp.asarray(lower + places * (upper - lower))
     density = jax.jit(lambda x: profile.density(Flat().locate(x)))
     found = jax.lax.map(density, places, batch_size=4096).reshape((cells,) * 3)
     return Grid(times * found, lower, upper)
@@ -57,7 +58,7 @@ def beam(cells):
     sun = Sun.at(28 * deg, 90 * deg, sunlight(40.0))
     eye = np.array([-0.8, -7.0, 1.5])
     camera = lambda size: Perspective(eye, 0.0, 6 * deg, 50 * deg, size, size)
-    solver = RayMarching(Fixed(cells), ShadowRays(24))
+    solver = RayMarching(Fixed(3 * cells), ShadowRays(24))
     return Scene(Flat(), 10.0, (smoke, *roof), (sun,), 0.3), solver, camera
 
 
@@ -73,7 +74,7 @@ def fire(cells):
     burning = Medium(soot, 0.4, 3.0, emission=Thermal(heat))
     plume = Puff(np.array([0.15, 0.0, 2.7]), 0.75, 0.6, 0.9, 0.6, 5, 8)
     smoke = Medium(sampled(plume, low, high, cells), 1.2, 0.8)
-    sun = Sun.at(80 * deg, 230 * deg, 0.4)
+    sun = Sun.at(80 * deg, 230 * deg, Constant(0.4))
     eye = np.array([0.0, -6.0, 1.7])
     camera = lambda size: Perspective(eye, 0.0, 2 * deg, 42 * deg, size, size)
     solver = RayMarching(Fixed(cells), ShadowCache(cells // 2))
@@ -109,11 +110,14 @@ def cloud(cells):
     return Scene(Flat(), 3000.0, (white,), (sun,), 0.15), solver, camera
 
 
+PICTURES = {"beam": beam, "fire": fire, "cloud": cloud}
+
+
 def main(folder, size, cells=128):
     """Writes the pictures, and all in one, into a folder, and returns their XYZ."""
     response = colour.response(WAVELENGTH)
     pictures, shown = {}, []
-    for name, make in [("beam", beam), ("fire", fire), ("cloud", cloud)]:
+    for name, make in PICTURES.items():
         scene, solver, camera = make(cells)
         sky = solve(scene, solver, WAVELENGTH)
         xyz = pictures[name] = render(sky, camera(size), response)
