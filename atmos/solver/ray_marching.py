@@ -18,8 +18,9 @@ from ..quantity import (
 from ..scene import Scene
 from ..transport import enter, extinctions
 from ._base import AbstractSolver
+from ._ray import cut, Found, Ray, total
 from ._shadows import AbstractShadows, ShadowRays
-from ._steps import AbstractSteps, cut, Fixed, Found, Ray, total
+from ._steps import AbstractSteps, Fixed
 
 
 class RayMarching(AbstractSolver):

@@ -10,10 +10,11 @@ from ..light import Sun
 from ..quantity import Direction, Position, Radiance, Wavelength
 from ..scene import Scene
 from ..transport import extinctions
-from ._event import begin, proceed, Quest
+from ._event import proceed
 from ._look import of_look
 from ._majorants import Majorants, majorants
 from ._tally import AbstractTracing, Tally
+from ._trip import begin, Quest
 from .single_scattering import SingleScattering
 
 
