@@ -6,6 +6,7 @@ from . import (
     colour as colour,
     comparison as comparison,
     geometry as geometry,
+    gridfile as gridfile,
     image as image,
     light as light,
     medium as medium,

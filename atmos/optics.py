@@ -6,7 +6,6 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from .medium import Ball, Grid
 from .quantity import Length, Wavelength
 from .scene import Scene
 from .transport import densities, extinctions, gauss_legendre
@@ -82,7 +81,7 @@ def _polarised(
 def check_layered(scene: Scene) -> None:
     """Raises `ValueError` for a medium that does not depend on altitude alone."""
     for i, x in enumerate(scene.media):
-        if isinstance(x.profile, (Ball, Grid)):
+        if not x.profile.layered:
             raise ValueError(
                 f"`scene.media[{i}].profile` must depend on altitude alone, for this "
                 f"solver; got {type(x.profile).__name__}."

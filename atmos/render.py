@@ -1,11 +1,13 @@
 """From a sky to a picture: one radiance per pixel and wavelength, or colour."""
 
+import operator
 from collections.abc import Callable
+from typing import Any
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 
 from .camera import AbstractCamera
 from .sky import AbstractPanorama, AbstractSky
@@ -13,6 +15,9 @@ from .sky import AbstractPanorama, AbstractSky
 
 _BLOCK = 2**13  # pixels that are worked on together, so that they stay in the cache
 _STRETCH = 2**20  # pixels between two reports of progress
+_RAYS, _RAY_STRETCH = 2**11, 2**15  # the same where each pixel is a ray of its own
+# One of each, so that what is compiled for a picture serves the next.
+_RADIANCE, _STOKES = operator.attrgetter("radiance"), operator.attrgetter("stokes")
 
 Response = Float[Array, "wl channel"]
 
@@ -30,8 +35,11 @@ def render(
     `response`, the sum over wavelengths of radiance times response, such as XYZ from
     `colour.response`. What the camera does not see is 0. `progress` is told now and
     then which share is done. Raises `ValueError` unless the camera stands straight
-    above the origin.
+    above the origin, or the sky holds what depends on the place: then each pixel is
+    looked at by itself.
     """
+    if not sky.has_panorama:
+        return _by_rays(sky, camera, response, progress, _RADIANCE)
     return _picture(sky, camera, response, progress, _radiance)
 
 
@@ -47,7 +55,10 @@ def render_stokes(
     In the frame of `atmos.polarisation`: Q counts what vibrates level, whichever way
     the camera is turned. Raises `ValueError` for a sky without polarisation, too.
     """
-    picture = _picture(sky, camera, response, progress, _stokes)
+    if not sky.has_panorama:
+        picture = _by_rays(sky, camera, response, progress, _STOKES)
+    else:
+        picture = _picture(sky, camera, response, progress, _stokes)
     return jnp.moveaxis(picture, 2, 0)
 
 
@@ -78,6 +89,53 @@ def _picture(
         parts.append(_stretch(panorama, zenith[part], around, response, look))
         progress(min(1.0, (first + rows) / camera.height))
     image = parts[0] if len(parts) == 1 else jnp.concatenate(parts)
+    return _seen(camera, image)
+
+
+def _by_rays(
+    sky: AbstractSky,
+    camera: AbstractCamera,
+    response: Response | None,
+    progress: Callable[[float], None],
+    looks: Callable[[Any], Callable[..., Array]],
+) -> Float[Array, "height width *stokes channel"]:
+    """Every pixel's centre by a ray of its own."""
+    dtype = sky.wavelength.dtype
+    camera = jax.tree.map(lambda x: x.astype(dtype), camera)
+    response = None if response is None else response.astype(dtype)
+    count, parts = camera.height * camera.width, []
+    stretch = min(_RAY_STRETCH, -(-count // _RAYS) * _RAYS)
+    for first in range(0, count, stretch):
+        pixels = jnp.arange(stretch, dtype=jnp.int32) + jnp.int32(first)
+        parts.append(_rays(sky, camera, pixels, response, looks))
+        progress(min(1.0, (first + stretch) / count))
+    image = jnp.concatenate(parts)[:count]
+    return _seen(camera, image.reshape(camera.height, camera.width, *image.shape[1:]))
+
+
+@eqx.filter_jit
+def _rays(
+    sky: AbstractSky,
+    camera: AbstractCamera,
+    pixels: Int[Array, "ray"],
+    response: Response | None,
+    looks: Callable[[Any], Callable[..., Array]],
+) -> Float[Array, "ray *stokes channel"]:
+    def one(pixel):
+        x, y = pixel % camera.width, pixel // camera.width
+        x, y = (a.astype(sky.wavelength.dtype) + 0.5 for a in (x, y))
+        radiance = looks(sky)(camera.position, camera.direction(x, y))
+        if response is None:
+            return radiance
+        return jnp.matmul(radiance, response, precision="highest")
+
+    return jax.lax.map(one, pixels, batch_size=_RAYS)
+
+
+def _seen(
+    camera: AbstractCamera, image: Float[Array, "height width *channel"]
+) -> Float[Array, "height width *channel"]:
+    """The picture, black where the camera does not see."""
     sees = camera.sees()
     if sees.size == 1:
         return image

@@ -9,7 +9,7 @@ import numpy as np
 from jax.core import Tracer
 from jaxtyping import Array, ArrayLike, Float
 
-from .quantity import as_float, Number, Spectral, Wavelength
+from .quantity import as_float, Number, Radiance, Spectral, Wavelength
 
 
 def _optional(x: ArrayLike | None) -> Array | None:
@@ -141,6 +141,22 @@ class Complement(AbstractSpectrum):
     @property
     def domain(self) -> tuple[float, float]:
         return self.of.domain
+
+
+# 2 h c^2, in W m^-2 sr^-1 nm^-1 um^5, and h c / k, in um K (CODATA 2018: both exact).
+_FIRST, _SECOND = 1.191042972397188e5, 1.438776877503933e4
+# Where the exponential would leave single precision, nothing is left to see.
+_COLD = 85.0
+
+
+def planck(wavelength: Wavelength, temperature: Number) -> Radiance:
+    """The radiance of a black body at a temperature in K (Planck 1901); 0 if cold."""
+    w = wavelength * 1e-3
+    cold = temperature * _COLD * w <= _SECOND
+    safe = jnp.where(cold, _SECOND / w, temperature)
+    x = _SECOND / (w * safe)
+    found = _FIRST / w**5 * jnp.exp(-x) / -jnp.expm1(-x)
+    return jnp.where(cold, 0.0, found)
 
 
 def as_spectrum(x: ArrayLike | AbstractSpectrum) -> AbstractSpectrum:

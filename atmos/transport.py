@@ -56,8 +56,9 @@ def column(
     profile: AbstractProfile, path: AbstractPath, far: Length, *, nodes: int
 ) -> Length:
     """How many metres of density 1 hold as much as lies between the start and `far`."""
-    inner = jnp.clip(profile.breaks(path), 0.0, far)
-    edges = jnp.concatenate([jnp.zeros_like(inner[:1]), inner, far[None]])
+    edges = jnp.clip(profile.breaks(path), 0.0, far)
+    if profile.box is None:
+        edges = jnp.concatenate([jnp.zeros_like(far)[None], edges, far[None]])
     begin, end = edges[:-1], edges[1:]
     # Start each piece at its lower end, where the medium is thickest.
     falls = 0.5 * (begin + end) < path.lowest()

@@ -76,7 +76,13 @@ def henyey_greenstein(g, cosine):
 
 @pytest.mark.parametrize(
     "solver, double",
-    [("single", False), ("single", True), ("columns", False), ("shared", False)],
+    [
+        ("single", False),
+        ("single", True),
+        ("columns", False),
+        ("shared", False),
+        ("march", False),
+    ],
 )
 def test_a_thin_slab_is_as_bright_as_its_phase_function(capsys, solver, double):
     command = (
@@ -180,6 +186,31 @@ def test_the_lamp_has_the_irradiance_of_the_sun(capsys):
     np.testing.assert_allclose(float(power), wanted, rtol=1e-4)
     weights = COLOUR_SPACES["rec709"].luminance_weights
     np.testing.assert_allclose(np.dot(colour, weights), float(lux), rtol=1e-3)
+
+
+GLOW = """
+sun = []
+
+[planet]
+shape = "flat"
+top = 100
+
+[[medium]]
+emission = 0.5
+profile = { kind = "box", lower = [-9, -9, 0], upper = [9, 9, 12] }
+"""
+
+
+def test_what_shines_is_marched_along_every_ray(capsys, folder):
+    (folder / "glow.toml").write_text(GLOW)
+    view = "--projection perspective --elevation 90 --field-of-view 20 --height 3"
+    output = "--colour-space spectral --wavelength 500,600 --no-preview"
+    run(capsys, f"sky glow.toml --solver march {view} --width 3 {output}")
+    found = read_exr("sky.exr").channels["S0.500,000000nm"]
+    # Of the box's 12 m one sees 10 from 2 m above the ground.
+    assert math.isclose(found[1, 1], 0.5 * 10.0, rel_tol=1e-5)
+    _, err = run(capsys, "sky glow.toml --height 3", 2)
+    assert "`medium[0].emission` must be None, for this solver" in err
 
 
 def test_spectral_pictures_hold_the_same_light(capsys):

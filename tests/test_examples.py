@@ -6,7 +6,7 @@ import pathlib
 import jax.numpy as jnp
 import numpy as np
 
-from atmos import colour
+from atmos import colour, render, solve
 from atmos.transport import direct_irradiance
 
 
@@ -35,3 +35,16 @@ def test_skies(tmp_path):
     due = radiance @ colour.response(nm)[:, 1]
     seen = luminance["noon"][-1]
     assert np.allclose(seen, due, rtol=2e-3), "the ground below reflects the sun"
+
+
+def test_volumes():
+    volumes = load("volumes")
+    scenes = {name: make(8) for name, make in volumes.PICTURES.items()}
+    # All of them are built; one is looked at, as each takes long to compile.
+    scene, solver, camera = scenes["fire"]
+    sky = solve(scene, solver, volumes.WAVELENGTH)
+    xyz = np.asarray(render(sky, camera(8), colour.response(volumes.WAVELENGTH)))
+    assert np.all(np.isfinite(xyz) & (xyz >= 0.0))
+    assert np.all(xyz[0, 0] == 0.0), "there is no air beside the smoke"
+    red, _, blue = xyz.reshape(-1, 3)[np.argmax(xyz[..., 1])]
+    assert red > 3.0 * blue, "fire is yellow"

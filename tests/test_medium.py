@@ -1,5 +1,7 @@
 """Laws that every profile obeys. A new one is tried by adding it to a list."""
 
+import dataclasses
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -10,16 +12,26 @@ from atmos import medium, phase
 from atmos.geometry import Flat, Spherical
 from atmos.medium import (
     Ball,
+    Box,
+    coloured,
+    Everywhere,
     Exponential,
+    Glow,
     Grid,
+    HeightFog,
     Medium,
+    Noise,
+    Product,
+    Puff,
     StandardAtmosphere,
     Tabulated,
     Tent,
+    Thermal,
+    Transformed,
     Uniform,
 )
 from atmos.scene import Scene
-from atmos.spectrum import Constant, PowerLaw
+from atmos.spectrum import Constant, planck, PowerLaw
 from atmos.transport import column, optical_depth
 
 
@@ -34,6 +46,13 @@ LAYERED = {
     "tent in the ground": (Tent(1e3, 2e3), 1.75e3, [1e3, 3e3]),
     "uniform": (Uniform(5e3, 20e3), 15e3, [5e3, 20e3]),
     "fog": (Uniform(0.0, 50.0), 50.0, [50.0]),
+    "everywhere": (Everywhere(), TOP, []),
+    "height fog": (HeightFog(100.0, 50.0), 150.0, [100.0]),
+    "cut exponential": (
+        Product(Exponential(8e3), Uniform(1e3, 9e3)),
+        8e3 * (np.exp(-1 / 8) - np.exp(-9 / 8)),
+        [1e3, 9e3],
+    ),
     "table": (Tabulated(knots, values), np.trapezoid(values, knots), knots[1:]),
     "table aloft": (
         Tabulated(np.array([9e3, 9.5e3, 11e3]), np.array([0.0, 1.0, 0.0])),
@@ -44,16 +63,26 @@ LAYERED = {
 ball = Ball(np.array([1e3, -2e3, 5e3]), 800.0)
 rng = np.random.default_rng(0)
 lower, upper = np.array([-1e3, 0.0, 2e3]), np.array([2e3, 500.0, 3e3])
+# Its columns: a box that leans and is turned about the vertical.
+TURN = np.array([[2e3, -100.0, 300.0], [1e3, 600.0, 0.0], [0.0, 0.0, 900.0]])
 LOCAL = {
     "ball": ball,
     "grid": Grid(rng.uniform(0.0, 1.0, (4, 3, 5)), lower, upper),
     "box": Grid(np.ones((2, 2, 2)), lower, upper),
     "one cell": Grid(np.ones((1, 1, 1)), lower, upper),
+    "real box": Box(lower, upper),
+    "turned box": Transformed(Box(np.zeros(3), np.ones(3)), TURN, lower),
+    "half ball": Product(ball, Uniform(5e3, 6e3)),
+}
+ROUGH = {
+    "noise": Noise(700.0, octaves=2),
+    "puff": Puff(np.array([1e3, -2e3, 5e3]), 800.0, 400.0, octaves=2),
 }
 ALL = {
     **{name: profile for name, (profile, _, _) in LAYERED.items()},
     "standard atmosphere": StandardAtmosphere(),
     **LOCAL,
+    **ROUGH,
 }
 each = pytest.mark.parametrize("profile", ALL.values(), ids=ALL)
 each_layered = pytest.mark.parametrize(
@@ -124,15 +153,15 @@ def along(profile, position, direction, distances):
     return profile.breaks(ray), ray.span(jnp.asarray(60e3)).far, density
 
 
-@each
-def test_density_is_smooth_between_breaks(profile):
+@pytest.mark.parametrize("name", [x for x in ALL if x not in ROUGH])
+def test_density_is_smooth_between_breaks(name):
     # Between neighbouring breaks a polynomial through Chebyshev's places is soon exact.
     positions = np.array(
         [[-500.0, 100.0, 2.2e3], [900.0, -2.1e3, 0.0], [0.0, 0.0, 45e3]]
     )
     directions = unit(np.array([[1.0, 0.01, 0.02], [0.0, 0.01, 1.0], [1.0, 0.0, -0.1]]))
-    if profile is LOCAL["grid"]:
-        profile = LOCAL["box"]  # inside, a grid has a kink at every cell
+    # Inside, a grid has a kink at every cell.
+    profile = LOCAL["box"] if name == "grid" else ALL[name]
     places = 0.5 - 0.5 * np.cos(np.linspace(0.02, np.pi - 0.02, 61))
     for ray in zip(positions, directions, strict=True):
         breaks, far, _ = along(profile, *map(jnp.asarray, ray), jnp.asarray(places))
@@ -264,6 +293,97 @@ def test_a_ray_through_an_even_grid_is_that_through_a_box(world, name):
     np.testing.assert_allclose(found, due, rtol=1e-10, atol=1e-9)
 
 
+def test_a_ray_through_a_turned_box_is_that_of_the_box_turned_back():
+    rays = rays_near(lower + TURN.sum(1) / 2, np.abs(TURN).sum(1) / 2)
+    found = passed(LOCAL["turned box"], Flat(), *rays, 30e3)
+    positions, directions = (np.linalg.solve(TURN, x.T).T for x in (rays[0], rays[1]))
+    positions = positions - np.linalg.solve(TURN, lower)
+    ends = np.sort([-positions / directions, (1.0 - positions) / directions], 0)
+    enter, leave = ends[0].max(-1), np.maximum(ends[1].min(-1), 0.0)
+    due = leave - np.clip(enter, 0.0, leave)
+    assert np.mean(due > 0.0) > 0.3
+    np.testing.assert_allclose(found, due, rtol=1e-10, atol=1e-8)
+
+
+def test_a_turned_grid_is_the_grid_seen_in_its_own_frame():
+    grid, turned = LOCAL["grid"], Transformed(LOCAL["grid"], TURN / 1e3, lower)
+    inside = rng.uniform(lower, upper, (2000, 3))
+    found = density(turned, jnp.asarray(inside @ TURN.T / 1e3 + lower))
+    np.testing.assert_allclose(found, density(grid, jnp.asarray(inside)), atol=1e-9)
+
+
+@pytest.mark.parametrize("name", [*LOCAL, *ROUGH])
+def test_nothing_of_a_medium_lies_outside_its_box(name):
+    profile = ALL[name]
+    if profile.box is None:
+        assert name == "noise"
+        return
+    low, high = map(np.asarray, profile.box)
+    places = rng.uniform(low - (high - low), high + (high - low), (4000, 3))
+    outside = np.any((places < low) | (places > high), -1)
+    found = np.asarray(density(profile, jnp.asarray(places)))
+    assert np.all(found[outside] == 0.0) and np.any(found[~outside] > 0.0)
+
+
+def test_noise_is_spread_evenly_about_0_and_has_no_steps():
+    noise = Noise(1.0, level=-1.0, softness=2.0, octaves=4)
+    places = rng.uniform(-200.0, 200.0, (4000, 3))
+    places[::2] = np.round(places[::2])  # at the lattice, where cells meet
+    found = 2.0 * np.asarray(density(noise, jnp.asarray(places))) - 1.0
+    assert abs(found.mean()) < 0.02 and 0.1 < found[1::2].std() < 0.4
+    near = 2.0 * np.asarray(density(noise, jnp.asarray(places - 1e-7))) - 1.0
+    assert np.max(np.abs(found - near)) < 1e-5
+
+
+def test_a_coloured_grid_has_the_extinction_of_the_grid_and_its_albedo():
+    grid = LOCAL["grid"]
+    albedo = rng.uniform(0.0, 1.0, (*grid.values.shape, 3))
+    media = coloured(grid, albedo, PowerLaw(0.02, -1.0), phase.Isotropic())
+    wavelength = jnp.array([620.0, 540.0, 450.0, 500.0])
+    centres = (np.array([1, 2, 3]) + 0.5) / grid.values.shape
+    point = Flat().locate(jnp.asarray(lower + centres * (upper - lower)))
+    here = [x.profile.density(point) for x in media]
+    total = sum(d * x.extinction(wavelength) for d, x in zip(here, media, strict=True))
+    scatters = sum(
+        d * x.scattering.evaluate(wavelength)
+        for d, x in zip(here, media, strict=True)
+        if x.scattering is not None
+    )
+    due = grid.values[1, 2, 3] * 0.02 * 550.0 / wavelength
+    np.testing.assert_allclose(total, due, rtol=1e-12)
+    np.testing.assert_allclose((scatters / total)[:3], albedo[1, 2, 3], rtol=1e-12)
+
+
+def test_a_black_body_shines_as_planck_says():
+    # Wien's displacement, 2.897771955 mm K, and Stefan and Boltzmann's constant.
+    wavelength = jnp.geomspace(100.0, 1e7, 200001)
+    for temperature in (300.0, 1800.0, 5772.0):
+        found = np.asarray(planck(wavelength, jnp.asarray(temperature)))
+        peak = np.asarray(wavelength)[np.argmax(found)]
+        assert peak * temperature == pytest.approx(2.897771955e6, rel=1e-3)
+        total = np.trapezoid(found, wavelength) * np.pi
+        assert total == pytest.approx(5.670374419e-8 * temperature**4, rel=1e-4)
+
+
+def test_a_cold_or_hot_body_has_a_radiance_and_a_slope():
+    wavelength = jnp.array([400.0, 700.0, 1e5], jnp.float32)
+    slope = jax.jit(jax.jacfwd(lambda t: planck(wavelength, t)))
+    for temperature in (0.0, 1.0, 300.0, 1e4, 1e8):
+        t = jnp.float32(temperature)
+        for x in (planck(wavelength, t), slope(t)):
+            assert x.dtype == jnp.float32
+            assert np.all(np.isfinite(x)) and np.all(x >= 0.0)
+    assert np.all(planck(wavelength, jnp.float32(0.0)) == 0.0)
+
+
+def test_warm_matter_shines_as_it_absorbs():
+    point, nm = Flat().locate(jnp.array([0.0, 1e2, 2.5e3])), jnp.array([500.0, 900.0])
+    hot = Thermal(Grid(np.full((2, 2, 2), 1500.0), lower, upper))
+    found = hot.evaluate(point, jnp.array([3.0]), nm)
+    np.testing.assert_allclose(found, 3.0 * planck(nm, jnp.asarray(1500.0)))
+    np.testing.assert_allclose(Glow(0.2).evaluate(point, jnp.array([3.0]), nm), 0.2)
+
+
 def test_a_ray_along_a_row_of_cells_adds_them_up():
     grid = LOCAL["grid"]
     size = (upper - lower) / np.array(grid.values.shape)
@@ -320,10 +440,47 @@ REFUSED = [
     (lambda: Uniform(0.0, np.inf), "`top - bottom` must be .* finite; got inf"),
     (lambda: Ball(np.zeros(3), -2.0), "`radius` must be above 0 and finite; got -2.0"),
     (lambda: Grid(*sides(1.0, 0.0, 1.0)), "`upper - lower` must be above 0 .* got 0.0"),
-    (lambda: Grid(-np.ones((2, 2, 2)), lower, upper), "`values` must be 0 or above"),
+    (
+        lambda: Grid(np.eye(3)[None] - 2.0 * np.eye(3)[:, None], lower, upper),
+        r"`values` must be 0 or above and finite; got values\[0, 0, 0\] = -1.0",
+    ),
+    (
+        lambda: Grid(np.where(np.eye(3) > 0, np.nan, 1.0)[None], lower, upper),
+        r"got values\[0, 0, 0\] = nan",
+    ),
+    (
+        lambda: Grid(np.zeros((2, 0, 2)), lower, upper),
+        r"`values` must have one cell or more; got shape \(2, 0, 2\)",
+    ),
+    (lambda: Box(lower, lower), "`upper - lower` must be above 0 .* got 0.0"),
+    (lambda: HeightFog(1.0, 0.0), "`scale_height` must be above 0"),
+    (lambda: Noise(0.0), "`size` must be above 0 and finite; got 0.0"),
+    (lambda: Noise(1.0, softness=-1.0), "`softness` must be above 0"),
+    (
+        lambda: Puff(np.zeros(3), 1.0, 1.0, -0.5),
+        "`roughness` must be 0 or above and finite; got -0.5",
+    ),
+    (
+        lambda: Transformed(Exponential(8e3), np.eye(3), np.zeros(3)),
+        "`of` must be a profile that depends on the place.* got Exponential",
+    ),
+    (
+        lambda: Transformed(ball, np.ones((3, 3)), np.zeros(3)),
+        "`matrix` must be finite and have an inverse",
+    ),
+    (
+        lambda: coloured(LOCAL["box"], np.ones((2, 2, 3)), 1.0, phase.Isotropic()),
+        r"`colour` must have the shape \(2, 2, 2, 3\); got \(2, 2, 3\)",
+    ),
+    (
+        lambda: coloured(
+            LOCAL["box"], np.full((2, 2, 2, 3), 2.0), 1.0, phase.Rayleigh()
+        ),
+        r"`colour` must be from 0 to 1; got colour\[0, 0, 0, 0\] = 2.0",
+    ),
     (
         lambda: Tabulated(np.array([0.0, 1e3]), np.array([1.0, -1.0])),
-        r"`values` must be 0 or above and finite; got \[ 1. -1.\]",
+        r"`values` must be 0 or above and finite; got values\[1\] = -1.0",
     ),
     (
         lambda: Tabulated(np.array([1e3, 0.0]), np.array([1.0, 1.0])),
@@ -349,7 +506,7 @@ def test_a_profile_can_be_built_inside_a_transformation(profile):
     @jax.jit
     def rebuilt(*leaves):
         again = jax.tree.unflatten(structure, leaves)
-        rebuild = type(again)(*(getattr(again, x) for x in vars(again)))
+        rebuild = dataclasses.replace(again)
         return rebuild.density(Flat().locate(jnp.array([0.0, 0.0, 10.0])))
 
     assert np.isfinite(rebuilt(*leaves))

@@ -4,6 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+import vdb_files
 
 from atmos import deg, earth, km, mars, medium, phase, Scene, spectrum
 from atmos.geometry import Flat, Spherical
@@ -177,6 +178,20 @@ MEDIA = [
             spectrum.as_spectrum(0.9), spectrum.as_spectrum(-0.5), SHARE
         ),
     ),
+    medium.Medium(medium.HeightFog(100.0, 50.0), scattering=0.01),
+    medium.Medium(
+        medium.Product(medium.Noise(300.0, 0.1, seed=3), medium.Everywhere()),
+        absorption=0.01,
+        emission=medium.Glow(spectrum.PowerLaw(0.2, 2.0)),
+    ),
+    medium.Medium(
+        medium.Transformed(
+            medium.Puff(np.zeros(3), 10.0, 4.0), np.eye(3) * 2.0, np.ones(3)
+        ),
+        scattering=1.0,
+        absorption=2.0,
+        emission=medium.Thermal(medium.Box(np.zeros(3), np.ones(3))),
+    ),
 ]
 SCENES = {
     "earth": earth(SUNLIT),
@@ -214,7 +229,8 @@ def test_the_sun_and_the_ground_are_written_by_name():
 def test_the_guide_names_every_kind():
     kinds = """exponential tent uniform table standard_atmosphere ball grid isotropic
     rayleigh henyey_greenstein double_henyey_greenstein cornette_shanks draine
-    empirical_mie power_law molecules ozone solar""".split()
+    empirical_mie power_law molecules ozone solar height_fog everywhere box file noise
+    puff transformed product blackbody""".split()
     assert all(f'kind = "{x}"' in GUIDE for x in kinds)
     assert parse(GUIDE + TEXT).top == 60e3
 
@@ -224,6 +240,46 @@ def test_a_scene_that_has_no_words_is_not_written():
     odd = medium.Medium(medium.Exponential(8 * km), absorption=mixed)
     with pytest.raises(ValueError, match=r"media\[0\].absorption"):
         dump(Scene(Flat(), 1 * km, (odd,), ()))
+
+
+FILES = """
+[[medium]]
+extinction = 2.0
+single_scattering_albedo = 0.5
+phase = { kind = "isotropic" }
+[medium.profile]
+kind = "transformed"
+of = { kind = "file", file = "smoke.vdb", grid = "density", factor = 2.0 }
+offset = [0.0, 0.0, 10.0]
+
+[[medium]]
+emission = { kind = "blackbody", temperature = { kind = "everywhere" } }
+absorption = 1.0
+profile = { kind = "file", file = "smoke.vdb", grid = "density" }
+
+[[medium]]
+extinction = 2.0
+colour = "tint"
+profile = { kind = "file", file = "cloud.npz", grid = "thick" }
+phase = { kind = "isotropic" }
+"""
+
+
+def test_a_scene_names_files_that_lie_beside_it(tmp_path):
+    path = tmp_path / "scene.toml"
+    path.write_text(PLANET + SUN + FILES)
+    with pytest.raises(ValueError, match="medium.0..profile.of.file.* cannot be read"):
+        load(path)
+    (tmp_path / "smoke.vdb").write_bytes(vdb_files.raw("float"))
+    box = {"lower": np.zeros(3), "upper": np.ones(3)}
+    tint = np.full((2, 2, 2, 3), 0.25)
+    np.savez(tmp_path / "cloud.npz", thick=np.ones((2, 2, 2)), tint=tint, **box)
+    smoke, fire, *cloud = load(path).media
+    np.testing.assert_array_equal(smoke.profile.of.values, 2.0 * fire.profile.values)
+    assert isinstance(fire.emission, medium.Thermal) and len(cloud) == 6
+    path.write_text(PLANET + SUN + FILES.replace('"density"', '"heat"'))
+    with pytest.raises(ValueError, match="`heat` must be one of density; got 'heat'"):
+        load(path)
 
 
 def changed(old, new):

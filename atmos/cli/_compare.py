@@ -33,7 +33,7 @@ from ._session import progress_bar, start
 from ._world import about, make_scene, solve_file, solver_named
 
 
-_SOLVERS = ("single", "shared", "columns")
+_SOLVERS = ("single", "shared", "columns", "shells")
 
 
 @app.command
@@ -68,9 +68,9 @@ def compare(
 ) -> None:
     """Two skies and their relative difference, side by side, with numbers.
 
-    Each is an OpenEXR file, a solver (single, shared, columns) or a model (preetham,
-    hosek, hosek-rgb, cie, perez). Skies that are not files are made with the options
-    below, without the sun's disk.
+    Each is an OpenEXR file, a solver (single, shared, columns, shells) or a model
+    (preetham, hosek, hosek-rgb, cie, perez). Skies that are not files are made with the
+    options below, without the sun's disk.
 
     For example:
 

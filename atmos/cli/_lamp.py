@@ -1,10 +1,12 @@
 """The sun as a lamp for other renderers; what the header of a picture says."""
 
+import contextlib
 import dataclasses
 import importlib.metadata
 from typing import Any
 
 import equinox as eqx
+import jax
 import numpy as np
 from jaxtyping import Array, Float
 
@@ -13,7 +15,12 @@ from ..colour import AbstractColourSpace
 from ..light import Sun
 from ..quantity import Irradiance, Position
 from ..rays import angles
+from ..scene import Scene
+from ..scenefile import dump
 from ..sky import AbstractSky
+
+
+_MOST_NUMBERS = 100_000  # in the header of a picture
 
 
 @dataclasses.dataclass(frozen=True)
@@ -80,6 +87,15 @@ def measure_lamp(
 @eqx.filter_jit
 def _beam(sky: AbstractSky, light: Sun, position: Position) -> Irradiance:
     return sky.beam(light, position)
+
+
+def described(scene: Scene) -> dict[str, str]:
+    """What the header says of a scene."""
+    # A cloud of millions of cells is no text; some things have no words.
+    if sum(x.size for x in jax.tree.leaves(scene)) <= _MOST_NUMBERS:
+        with contextlib.suppress(ValueError):
+            return {"scene": dump(scene)}
+    return {}
 
 
 def header(wavelength: np.ndarray, lamps: list[Lamp]) -> dict[str, Any]:

@@ -11,10 +11,9 @@ from .. import colour, image
 from ..camera import AbstractCamera, LatLong
 from ..disk import render_disks
 from ..render import render, render_stokes
-from ..scenefile import dump
 from ..sky import AbstractSky
 from ._app import app, CAMERA, flat, MODEL, option, OUTPUT, refuse, SUN, WORLD
-from ._lamp import header, measure_lamp
+from ._lamp import described, header, measure_lamp
 from ._model import Model
 from ._options import (
     Bake,
@@ -101,7 +100,7 @@ def sky(
     found = make_scene(scene, world, sun, float(step))
     method = solver_named(solver, stokes, float(camera.position[2]))
     solved = lambda: solve_file(found, method, wavelength, scene, bake)
-    said |= {"scene": dump(found), "solver": str(method)}
+    said |= {"solver": str(method)} | described(found)
     write_picture(solved, camera, wavelength, files, preview, said, stokes)
 
 

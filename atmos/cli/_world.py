@@ -18,7 +18,10 @@ from ..scenefile import load, opac
 from ..solver import (
     AbstractSolver,
     Columns,
+    Fixed,
     QUICK,
+    RayMarching,
+    ShadowCache,
     Shared,
     Shells,
     SingleScattering,
@@ -128,6 +131,10 @@ def solver_named(
         if stokes != 1:
             refuse("--stokes", f"must be 1 with --solver {name}", stokes)
         return more[name](single=single)
+    if name == "march":
+        if stokes != 1:
+            refuse("--stokes", "must be 1 with --solver march", stokes)
+        return RayMarching(Fixed(256), ShadowCache(96))
     return dataclasses.replace(single, stokes=stokes)
 
 

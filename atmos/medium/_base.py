@@ -4,13 +4,15 @@ import math
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax.core import Tracer
 from jaxtyping import Array, ArrayLike, Float
 
 from ..geometry import AbstractPath, Point
 from ..phase import AbstractPhaseFunction, Isotropic
-from ..quantity import Number, Spectral, Wavelength
+from ..quantity import Number, Position, Spectral, Wavelength
 from ..spectrum import AbstractSpectrum, as_spectrum, Complement, Product
+from ._emission import AbstractEmission
 
 
 class AbstractProfile(eqx.Module):
@@ -32,6 +34,35 @@ class AbstractProfile(eqx.Module):
         Where it depends on altitude they include the lowest place of the ray, so that
         between two breaks the ray rises or falls. Numbers outside the ray do no harm.
         """
+
+    @property
+    def layered(self) -> bool:
+        """Whether the density depends on altitude alone."""
+        return True
+
+    @property
+    def box(self) -> tuple[Position, Position] | None:
+        """The lower and upper corner of a box that holds all of it; None if none does.
+
+        Nothing of it then lies before the first of its `breaks`, or after the last.
+        """
+        return None
+
+    def most(self, lower: Position, upper: Position) -> Number:
+        """What the density does not exceed anywhere in a box above the ground."""
+        return jnp.ones_like(lower[0])
+
+
+class AbstractLocal(AbstractProfile):
+    """A density that depends on the place."""
+
+    @property
+    def levels(self) -> Float[Array, "0"]:
+        return jnp.zeros(0)
+
+    @property
+    def layered(self) -> bool:
+        return False
 
 
 def crossings(
@@ -58,13 +89,15 @@ class Medium(eqx.Module):
     """One kind of stuff in the air. A scene holds several; their effects add.
 
     `scattering` and `absorption` are coefficients in m^-1 where `profile` is 1. A
-    medium that only absorbs has no `scattering`: solvers do not look for its light.
+    medium that only absorbs has no `scattering`: solvers do not look for its light. One
+    that shines has an `emission`.
     """
 
     profile: AbstractProfile
     scattering: AbstractSpectrum | None = eqx.field(converter=_maybe, default=None)
     absorption: AbstractSpectrum = eqx.field(converter=as_spectrum, default=0.0)
     phase: AbstractPhaseFunction = Isotropic()
+    emission: AbstractEmission | None = None
 
     def extinction(self, wavelength: Wavelength) -> Spectral:
         """What one metre takes out of a beam where the profile is 1, in m^-1."""
@@ -96,7 +129,16 @@ def check_above_zero(name: str, value: Array) -> None:
 
 
 def check_not_negative(name: str, values: Array) -> None:
-    """Refuses an array with a number below 0 or not finite, with `ValueError`."""
+    """Refuses an array with a number below 0 or not finite, with `ValueError`.
+
+    It says where the first one is.
+    """
     if not isinstance(values, Tracer):
-        if not bool(jnp.all(jnp.isfinite(values) & (values >= 0.0))):
-            raise ValueError(f"`{name}` must be 0 or above and finite; got {values}.")
+        known = np.asarray(values)
+        good = np.isfinite(known) & (known >= 0.0)
+        if not np.all(good):
+            first = tuple(int(x) for x in np.argwhere(~good)[0])
+            where = f"{name}{list(first)} = " if first else ""
+            raise ValueError(
+                f"`{name}` must be 0 or above and finite; got {where}{known[first]}."
+            )

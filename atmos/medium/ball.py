@@ -4,10 +4,11 @@ from jaxtyping import Array, Float
 
 from ..geometry import AbstractPath, Point
 from ..quantity import as_float, Length, Number, Position
-from ._base import AbstractProfile, check_above_zero
+from ._base import AbstractLocal, check_above_zero
+from ._bounds import sphere_meets, through_sphere
 
 
-class Ball(AbstractProfile):
+class Ball(AbstractLocal):
     """1 inside a sphere of `radius` m around `centre`, 0 outside."""
 
     centre: Position = eqx.field(converter=as_float)
@@ -21,15 +22,12 @@ class Ball(AbstractProfile):
         inside = jnp.dot(apart, apart) <= self.radius * self.radius
         return jnp.where(inside, jnp.ones_like(self.radius), 0.0)
 
-    @property
-    def levels(self) -> Float[Array, "0"]:
-        return jnp.zeros(0, self.radius.dtype)
+    def breaks(self, path: AbstractPath) -> Float[Array, "2"]:
+        return through_sphere(path, self.centre, self.radius)
 
-    def breaks(self, path: AbstractPath) -> Float[Array, "n"]:
-        to_centre = self.centre - path.start.position
-        middle = jnp.dot(to_centre, path.direction)
-        aside = to_centre - middle * path.direction
-        squared = self.radius * self.radius - jnp.dot(aside, aside)
-        hit = squared > 0.0
-        half = jnp.where(hit, jnp.sqrt(jnp.where(hit, squared, 1.0)), 0.0)
-        return jnp.stack([middle - half, middle + half])
+    def most(self, lower: Position, upper: Position) -> Number:
+        return sphere_meets(self.centre, self.radius, lower, upper)
+
+    @property
+    def box(self) -> tuple[Position, Position]:
+        return self.centre - self.radius, self.centre + self.radius

@@ -1,18 +1,20 @@
 import equinox as eqx
 import jax.numpy as jnp
-import jax.scipy as jsp
 from jaxtyping import Array, Float
 
 from ..geometry import AbstractPath, Point
 from ..quantity import as_float, Number, Position
-from ._base import AbstractProfile, check_above_zero, check_not_negative
+from ._base import AbstractLocal, check_above_zero, check_not_negative
+from ._bounds import through_box
+from ._trilinear import trilinear, window_most
 
 
-class Grid(AbstractProfile):
+class Grid(AbstractLocal):
     """Values at the centres of equal cells in the box from `lower` to `upper`, in m.
 
     Between the centres it is trilinear, in the outermost half cells constant, and
-    outside the box 0.
+    outside the box 0. Raises `ValueError` for a grid without cells, and for values that
+    are below 0 or not finite, saying where.
     """
 
     values: Float[Array, "nx ny nz"] = eqx.field(converter=as_float)
@@ -20,28 +22,33 @@ class Grid(AbstractProfile):
     upper: Position = eqx.field(converter=as_float)
 
     def __check_init__(self):
+        if self.values.size == 0:
+            raise ValueError(
+                f"`values` must have one cell or more; got shape {self.values.shape}."
+            )
         check_not_negative("values", self.values)
         for size in self.upper - self.lower:
             check_above_zero("upper - lower", size)
 
     def density(self, point: Point) -> Number:
-        share = (point.position - self.lower) / (self.upper - self.lower)
-        inside = jnp.all((share >= 0.0) & (share <= 1.0))
-        cell = share * jnp.asarray(self.values.shape, share.dtype) - 0.5
-        value = jsp.ndimage.map_coordinates(
-            self.values, list(cell), order=1, mode="nearest"
-        )
+        x, y, z = (point.position - self.lower) / (self.upper - self.lower)
+        inside = (x >= 0.0) & (x <= 1.0) & (y >= 0.0) & (y <= 1.0)
+        inside = inside & (z >= 0.0) & (z <= 1.0)
+        sizes = zip(self.values.shape, (x, y, z), strict=True)
+        value = trilinear(self.values, *(n * share - 0.5 for n, share in sizes))
         return jnp.where(inside, value, 0.0)
 
-    @property
-    def levels(self) -> Float[Array, "0"]:
-        return jnp.zeros(0, self.values.dtype)
+    def breaks(self, path: AbstractPath) -> Float[Array, "2"]:
+        return through_box(path, self.lower, self.upper)
 
-    def breaks(self, path: AbstractPath) -> Float[Array, "n"]:
-        slope = path.direction
-        slope = jnp.where(jnp.abs(slope) < 1e-12, 1e-12, slope)
-        one = (self.lower - path.start.position) / slope
-        other = (self.upper - path.start.position) / slope
-        enter = jnp.max(jnp.minimum(one, other))
-        leave = jnp.min(jnp.maximum(one, other))
-        return jnp.stack([enter, jnp.maximum(enter, leave)])
+    def most(self, lower: Position, upper: Position) -> Number:
+        # A little wider than it is: what rounding moves into the box is in it.
+        size = (self.upper - self.lower) / jnp.array(self.values.shape, lower.dtype)
+        low, high = (lower - self.lower) / size - 0.51, (upper - self.lower) / size
+        meets = jnp.all((lower <= self.upper) & (upper >= self.lower))
+        most = window_most(self.values, low, high - 0.49)
+        return jnp.where(meets, most, 0.0)
+
+    @property
+    def box(self) -> tuple[Position, Position]:
+        return self.lower, self.upper

@@ -3,7 +3,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..geometry import AbstractPath, Point
-from ..quantity import as_float, Number
+from ..quantity import as_float, Number, Position
 from ..spectrum import check_table
 from ._base import AbstractProfile, check_not_negative, crossings
 
@@ -23,6 +23,9 @@ class Tabulated(AbstractProfile):
 
     def density(self, point: Point) -> Number:
         return jnp.interp(point.altitude, self.knots, self.values, left=0.0, right=0.0)
+
+    def most(self, lower: Position, upper: Position) -> Number:
+        return jnp.max(self.values)
 
     @property
     def levels(self) -> Float[Array, "n"]:

@@ -1,5 +1,24 @@
-from .. import medium
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import os
+from collections.abc import Iterator
+from contextvars import ContextVar
+from typing import Annotated
+
+import msgspec
+
+from .. import gridfile, medium
 from ._base import Above0, AtLeast0, Kind
+from ._errors import under
+
+
+# Where files that a scene names are looked for.
+FOLDER: ContextVar[str] = ContextVar("FOLDER", default=".")
+Place = tuple[float, float, float]
+Octaves = Annotated[int, msgspec.Meta(ge=1, le=16)]
+Seed = Annotated[int, msgspec.Meta(ge=0, lt=2**31)]
 
 
 class Exponential(Kind, tag="exponential"):
@@ -29,17 +48,124 @@ class StandardAtmosphere(Kind, tag="standard_atmosphere"):
     makes = medium.StandardAtmosphere
 
 
+class HeightFog(Kind, tag="height_fog"):
+    makes = medium.HeightFog
+    top: float
+    scale_height: Above0
+
+
+class Everywhere(Kind, tag="everywhere"):
+    makes = medium.Everywhere
+
+
 class Ball(Kind, tag="ball"):
     makes = medium.Ball
-    centre: tuple[float, float, float]
+    centre: Place
     radius: Above0
+
+
+class Box(Kind, tag="box"):
+    makes = medium.Box
+    lower: Place
+    upper: Place
+
+
+class Noise(Kind, tag="noise"):
+    makes = medium.Noise
+    size: Above0
+    level: float = 0.0
+    softness: Above0 = 0.5
+    octaves: Octaves = 5
+    seed: Seed = 0
+
+
+class Puff(Kind, tag="puff"):
+    makes = medium.Puff
+    centre: Place
+    radius: Above0
+    size: Above0
+    roughness: AtLeast0 = 0.8
+    softness: Above0 = 0.2
+    octaves: Octaves = 5
+    seed: Seed = 0
 
 
 class Grid(Kind, tag="grid"):
     makes = medium.Grid
     values: list[list[list[AtLeast0]]]
-    lower: tuple[float, float, float]
-    upper: tuple[float, float, float]
+    lower: Place
+    upper: Place
 
 
-Profile = Exponential | Tent | Uniform | Levels | StandardAtmosphere | Ball | Grid
+@contextlib.contextmanager
+def located(name: str) -> Iterator[str]:
+    """Where a file is that a scene names; that it cannot be read is a `ValueError`."""
+    try:
+        yield os.path.join(FOLDER.get(), name)
+    except OSError as error:
+        raise ValueError(f"{name}: cannot be read: {error.strerror}.") from error
+
+
+class File(Kind, tag="file"):
+    """The grid of a name in an OpenVDB file or a NumPy archive, times `factor`."""
+
+    file: str
+    grid: str
+    factor: AtLeast0 = 1.0
+
+    def build(self) -> medium.AbstractProfile:
+        with under("file"), located(self.file) as path:
+            found = gridfile.load(path, self.grid)
+        return found if self.factor == 1.0 else _scaled(found, self.factor)
+
+
+def _scaled(found: medium.AbstractProfile, factor: float) -> medium.AbstractProfile:
+    if isinstance(found, medium.Transformed):
+        return dataclasses.replace(found, of=_scaled(found.of, factor))
+    assert isinstance(found, medium.Grid)
+    return dataclasses.replace(found, values=found.values * factor)
+
+
+class Transformed(Kind, tag="transformed"):
+    """`of`, turned and stretched by the rows of `matrix`, and moved by `offset`."""
+
+    makes = medium.Transformed
+    of: Profile
+    matrix: tuple[Place, Place, Place] = (
+        (1.0, 0.0, 0.0),
+        (0.0, 1.0, 0.0),
+        (0.0, 0.0, 1.0),
+    )
+    offset: Place = (0.0, 0.0, 0.0)
+
+
+class Product(Kind, tag="product"):
+    makes = medium.Product
+    one: Profile
+    other: Profile
+
+
+class Blackbody(Kind, tag="blackbody"):
+    """What is absorbed shines, as warm as a profile says, in K."""
+
+    makes = medium.Thermal
+    temperature: Profile
+
+
+Profile = (
+    Exponential
+    | Tent
+    | Uniform
+    | Levels
+    | StandardAtmosphere
+    | HeightFog
+    | Everywhere
+    | Ball
+    | Box
+    | Noise
+    | Puff
+    | Grid
+    | File
+    | Transformed
+    | Product
+)

@@ -9,6 +9,7 @@ import msgspec
 
 from ..scene import Scene
 from ._errors import refuse, short
+from ._profiles import FOLDER
 from ._scene import File
 
 
@@ -17,15 +18,19 @@ _LARGEST = 3.4e38
 
 
 def load(path: str | os.PathLike[str]) -> Scene:
-    """Reads a scene file.
+    """Reads a scene file; files that it names are looked for beside it.
 
     Raises `ValueError` naming the file, the key, the rule and the value where it is not
     TOML, or not a scene; `OSError` where it cannot be read.
     """
     with open(path, "rb") as file:
         raw = file.read()
-    with _of_file(os.fspath(path)):
-        return parse(raw.decode())
+    token = FOLDER.set(os.path.dirname(os.fspath(path)) or ".")
+    try:
+        with _of_file(os.fspath(path)):
+            return parse(raw.decode())
+    finally:
+        FOLDER.reset(token)
 
 
 def parse(text: str) -> Scene:

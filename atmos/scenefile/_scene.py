@@ -3,7 +3,7 @@ from typing import Annotated, Literal
 
 import msgspec
 
-from .. import light, medium, particle, phase, spectrum
+from .. import gridfile, light, medium, particle, phase, spectrum
 from ..geometry import AbstractGeometry, Flat, Spherical
 from ..particle import aerosol, surface
 from ..quantity import deg
@@ -12,7 +12,7 @@ from ..scene import air, haze, ozone, Scene
 from ._base import Above0, AtLeast0, build, Table, within
 from ._errors import refuse, under
 from ._phases import Phase
-from ._profiles import Profile
+from ._profiles import Blackbody, File as GridFile, located, Profile
 from ._spectra import Constant, Molecules, Ozone, PowerLaw, Solar, Spectrum, Tabulated
 
 
@@ -64,14 +64,19 @@ class Medium(Table):
     single_scattering_albedo: Spectrum | None = None
     profile: Profile | None = None
     phase: Phase | None = None
+    emission: Spectrum | Blackbody | None = None
+    colour: str | None = None
     preset: str | None = None
     column: AtLeast0 | None = None
     optical_depth: AtLeast0 | None = None
     visibility: Above0 | None = None
 
-    def build(self) -> medium.Medium:
+    def build(self) -> tuple[medium.Medium, ...]:
         if self.preset is not None:
-            return self._ready_made(self.preset)
+            return (self._ready_made(self.preset),)
+        return self._coloured() if self.colour is not None else (self._plain(),)
+
+    def _plain(self) -> medium.Medium:
         self._alone("column", "optical_depth", "visibility", beside="no `preset`")
         if self.profile is None:
             refuse("profile", "is missing")
@@ -88,16 +93,49 @@ class Medium(Table):
             albedo = within("single_scattering_albedo", albedo, 0.0, 1.0)
             extinction = within("extinction", self.extinction, 0.0)
             assert shape is not None
-            return medium.of_extinction(extinction, albedo, profile, shape)
+            found = medium.of_extinction(extinction, albedo, profile, shape)
+            return dataclasses.replace(found, emission=self._emission())
         self._alone("single_scattering_albedo", beside="no `extinction`")
         parts = {
             name: within(name, value, 0.0)
             for name in ("scattering", "absorption")
             if (value := getattr(self, name)) is not None
         }
-        if not parts:
+        emission = self._emission()
+        if not parts and emission is None:
             refuse("scattering", "is missing, and so are `absorption`, `extinction`")
-        return medium.Medium(profile, **parts, phase=shape or phase.Isotropic())
+        return medium.Medium(
+            profile, **parts, phase=shape or phase.Isotropic(), emission=emission
+        )
+
+    def _emission(self) -> medium.AbstractEmission | None:
+        if self.emission is None:
+            return None
+        if isinstance(self.emission, Blackbody):
+            return build("emission", self.emission)
+        return medium.Glow(within("emission", self.emission, 0.0))
+
+    def _coloured(self) -> tuple[medium.Medium, ...]:
+        """Of a density and a `colour` in one file."""
+        others = "scattering", "absorption", "single_scattering_albedo", "emission"
+        self._alone(*others, beside="`colour`")
+        if not isinstance(self.profile, GridFile):
+            refuse("colour", 'needs a `profile` of kind "file"', self.colour)
+        if self.extinction is None or self.phase is None:
+            refuse("extinction", "is missing beside `colour`, or `phase` is")
+        assert self.colour is not None
+        extinction = within("extinction", self.extinction, 0.0)
+        if self.profile.factor != 1.0:
+            factor = spectrum.Constant(self.profile.factor)
+            extinction = spectrum.Product(extinction, factor)
+        with under("profile.file"), located(self.profile.file) as path:
+            return gridfile.load_coloured(
+                path,
+                self.profile.grid,
+                self.colour,
+                extinction,
+                build("phase", self.phase),
+            )
 
     def _ready_made(self, preset: str) -> medium.Medium:
         own = {"air": (), "ozone": ("column",)}
@@ -135,7 +173,7 @@ class File(Table):
         return Scene(
             geometry,
             self.planet.top,
-            tuple(build(key, x) for key, x in media.items()),
+            tuple(found for key, x in media.items() for found in build(key, x)),
             tuple(build(key, x) for key, x in suns.items()),
             ground,
         )

@@ -41,8 +41,18 @@ GUIDE = """\
 #            { kind = "uniform", bottom, top }
 #            { kind = "table", altitude, value }: straight lines, and nothing outside
 #            { kind = "standard_atmosphere" }: the air of 1976, 1 at the ground
+#            { kind = "height_fog", top, scale_height }: 1 up to the top
+#            { kind = "everywhere" }
 #            { kind = "ball", centre, radius }
+#            { kind = "box", lower, upper }
 #            { kind = "grid", values, lower, upper }: values[x][y][z] in a box
+#            { kind = "file", file, grid, factor }: a grid by its name in an OpenVDB
+#            file (.vdb) or a NumPy archive (.npz, with arrays `lower` and `upper`)
+#            { kind = "noise", size, level, softness, octaves, seed }: clouds, 0 to 1
+#            { kind = "puff", centre, radius, size, roughness, softness, octaves, seed }
+#            { kind = "transformed", of, matrix, offset }: `of` is a profile, `matrix`
+#            has three rows of three numbers
+#            { kind = "product", one, other }: of two profiles, to bound noise by a box
 #   phase    { kind = "isotropic" }
 #            { kind = "rayleigh", depolarisation }
 #            { kind = "henyey_greenstein", g }
@@ -58,6 +68,12 @@ GUIDE = """\
 #            { kind = "molecules", gas = "air" or "carbon_dioxide", number_density } is
 #            a `scattering`, and without number_density (1/m^3) a `depolarisation`.
 #            { kind = "ozone", number_density } is an `absorption`.
+# Emission   A medium with an `emission` shines: a spectrum, in W m^-2 sr^-1 nm^-1 per m
+#            where the profile is 1; or { kind = "blackbody", temperature }: a profile
+#            in K; it shines as it absorbs.
+# Colour     A medium with an `extinction` and a profile of kind "file" may have a
+#            `colour`: the name of a grid of red, green and blue in the same file, the
+#            share that scatters.
 # Presets    A medium may be as short as this: preset = "air"; preset = "ozone", with a
 #            `column` in Dobson units; preset = "continental_clean" or another aerosol
 #            (see `atmos sky --help`), with an `optical_depth` or a `visibility`.
@@ -120,6 +136,10 @@ def _table(value: Any) -> Any:
     """A profile, a phase function or a spectrum as a table, or as a number."""
     if isinstance(value, spectrum.Constant):
         return _number(value.value)
+    if isinstance(value, int):
+        return value
+    if isinstance(value, medium.Glow):
+        return _table(value.spectrum)
     if isinstance(value, eqx.Module) and type(value) in _WRITTEN:
         fields = [getattr(value, x.name) for x in dataclasses.fields(value)]
         return _WRITTEN[type(value)](*map(_table, fields))
@@ -224,6 +244,13 @@ def _sun(sun: light.Sun) -> Sun:
 
 
 def _medium(value: medium.Medium) -> Medium:
+    found = _passive(value)
+    if value.emission is not None:
+        found.emission = _described("emission", value.emission, _table)
+    return found
+
+
+def _passive(value: medium.Medium) -> Medium:
     profile = _described("profile", value.profile, _table)
     if value.scattering is None:
         absorption = _described("absorption", value.absorption, _table)

@@ -68,6 +68,11 @@ class AbstractSky(eqx.Module):
     def radiance(self, position: Position, direction: Direction) -> Radiance:
         """What one sees from `position` in `direction`, but for the disks of lights."""
 
+    @property
+    def has_panorama(self) -> bool:
+        """Whether all that one sees from a place can be tabulated."""
+        return True
+
     @abc.abstractmethod
     def panorama(self, position: Position) -> AbstractPanorama:
         """All that one sees from `position`, made ready for millions of looks."""

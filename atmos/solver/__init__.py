@@ -4,13 +4,27 @@ from ._base import (
     solve as solve,
     SolvedSky as SolvedSky,
 )
-from .columns import Columns as Columns, Fluxes as Fluxes
-from .path_tracing import (
+from ._shadows import (
+    AbstractShadows as AbstractShadows,
+    ShadowCache as ShadowCache,
+    ShadowRays as ShadowRays,
+)
+from ._steps import (
+    AbstractSteps as AbstractSteps,
+    Adaptive as Adaptive,
+    Fixed as Fixed,
+    Jittered as Jittered,
+)
+from ._tally import (
+    AbstractTracing as AbstractTracing,
     Estimate as Estimate,
     estimate as estimate,
-    PathTracing as PathTracing,
     Tally as Tally,
 )
+from .columns import Columns as Columns, Fluxes as Fluxes
+from .path_tracing import PathTracing as PathTracing
+from .ray_marching import RayMarching as RayMarching
 from .shared import Shared as Shared
 from .shells import Shells as Shells
 from .single_scattering import QUICK as QUICK, SingleScattering as SingleScattering
+from .volume_tracing import VolumeTracing as VolumeTracing

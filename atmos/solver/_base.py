@@ -35,10 +35,12 @@ class AbstractSolver(eqx.Module):
     """A way to find the light in a scene.
 
     By day, what it finds varies little between `around` azimuths on half a circle. It
-    is radiance alone where `stokes` is 1, and I, Q and U where that is 3.
+    is radiance alone where `stokes` is 1, and I, Q and U where that is 3. What media
+    shine of themselves is found where `shining`; elsewhere such media are refused.
     """
 
     around: ClassVar[int]
+    shining: ClassVar[bool] = False
     stokes: eqx.AbstractVar[int]
 
     def check(self, scene: Scene, wavelength: Wavelength) -> Scene:
@@ -84,6 +86,17 @@ class AbstractSolver(eqx.Module):
         I, Q and U as they stand.
         """
 
+    def emitted(
+        self,
+        prepared: PyTree[Any],
+        scene: Scene,
+        wavelength: Wavelength,
+        position: Position,
+        direction: Direction,
+    ) -> Radiance:
+        """What one sees of media that shine of themselves."""
+        return jnp.zeros_like(wavelength)
+
 
 def check_stokes(stokes: int) -> None:
     """Raises `ValueError` for a number of Stokes parameters that is not 1 or 3."""
@@ -99,8 +112,17 @@ class SolvedSky(AbstractSky):
     wavelength: Wavelength
     prepared: PyTree[Any]
 
+    @property
+    def has_panorama(self) -> bool:
+        media = self.scene.media
+        return all(x.profile.layered and x.emission is None for x in media)
+
     def radiance(self, position: Position, direction: Direction) -> Radiance:
         total = jnp.zeros_like(self.wavelength)
+        if any(x.emission is not None for x in self.scene.media):
+            total += self.solver.emitted(
+                self.prepared, self.scene, self.wavelength, position, direction
+            )
         for light in self.scene.lights:
             parts = self._parts(light, position, direction)
             turned = versine(direction, light.direction)
@@ -300,6 +322,12 @@ def admit(
         nm = eqx.error_if(nm, ~known, "`wavelength` must lie between 100 and 1e5 nm.")
     else:
         _check_wavelength(scene, np.asarray(nm))
+    for i, x in enumerate(scene.media):
+        if x.emission is not None and not solver.shining:
+            raise ValueError(
+                f"`scene.media[{i}].emission` must be None, for this solver; got "
+                f"{type(x.emission).__name__}."
+            )
     scene = jax.tree.map(lambda x: x.astype(nm.dtype), scene)
     return solver.check(scene, nm), nm
 

@@ -122,18 +122,22 @@ def _quantile(u: Number, rate: Number) -> Number:
 
 
 def phase(
-    task: Task, mixture: Float[Array, "medium wl"], apart: Versine
+    scene: Scene,
+    wavelength: Wavelength,
+    mixture: Float[Array, "medium wl"],
+    apart: Versine,
 ) -> Float[Array, "wl"]:
     """How much of what turns goes this way, per steradian."""
-    total = jnp.zeros_like(task.wavelength)
-    for part, x in zip(mixture, task.scene.media, strict=True):
+    total = jnp.zeros_like(wavelength)
+    for part, x in zip(mixture, scene.media, strict=True):
         if x.scattering is not None:
-            total += part * x.phase.evaluate(apart, task.wavelength)
+            total += part * x.phase.evaluate(apart, wavelength)
     return total
 
 
-def _turn(
-    task: Task,
+def turn(
+    scene: Scene,
+    wavelength: Wavelength,
     mixture: Float[Array, "medium wl"],
     hero: Integer[Array, ""],
     u: Number,
@@ -142,15 +146,15 @@ def _turn(
     """An angle drawn as the hero's wavelength turns."""
     upto = jnp.cumsum(mixture[:, hero])
     found, below = jnp.zeros_like(u), jnp.zeros_like(u)
-    for i, x in enumerate(task.scene.media):
+    for i, x in enumerate(scene.media):
         if x.scattering is None:
             continue
         draw = lambda wavelength, x=x: x.phase.sample(key, wavelength[None])
-        value = jax.eval_shape(x.phase.evaluate, u, task.wavelength)
+        value = jax.eval_shape(x.phase.evaluate, u, wavelength)
         if value.shape[0] == 1:
-            drawn = draw(task.wavelength[0])
+            drawn = draw(wavelength[0])
         else:
-            drawn = jax.vmap(draw)(task.wavelength)[hero]
+            drawn = jax.vmap(draw)(wavelength)[hero]
         mine = (u * upto[-1] >= below) & (u * upto[-1] < upto[i])
         found, below = jnp.where(mine, drawn, found), upto[i]
     return found
@@ -174,7 +178,8 @@ def depart(
     layers = task.layers
     whence = layers.whence[layers.shell(place.piece), cell(jnp.dot(up, sun))]
     count = whence.shape[0]
-    apart = _turn(task, place.mixture, hero, u[0], key)
+    where = task.scene, task.wavelength
+    apart = turn(*where, place.mixture, hero, u[0], key)
     cosine = jnp.where(place.grounded, jnp.sqrt(u[1]), 1.0 - apart)
     sine = jnp.where(place.grounded, 1.0 - u[1], apart * (2.0 - apart))
     axis = jnp.where(place.grounded, up, along)
@@ -191,7 +196,7 @@ def depart(
     led = jnp.where(order < _LED, _TURNS * spread * spread, 0.0)
     guided = ~place.grounded & (u[3] < led[hero])
     direction = jnp.where(guided, directions.draw(chosen, u[1:3], up, sun), turned)
-    turns = phase(task, place.mixture, versine(along, direction))
+    turns = phase(*where, place.mixture, versine(along, direction))
     known = whence[directions.sort(direction, up, sun)] * (count * 0.25 / math.pi)
     chance = turns + led * (known - turns)
     falls = jnp.maximum(jnp.dot(up, direction), 0.0) / math.pi

@@ -82,11 +82,12 @@ def advance(task: Task, walk: Walk) -> Walk:
     hero, order = walk.hero, walk.order
     place = land(task, flight, even, guessed, hero, order, u[:2])
     grounded, here = place.grounded, place.point
-    weight, ratio = _weigh(walk.weight, walk.ratio, place.seen, place.chance)
+    weight, ratio = weigh(walk.weight, walk.ratio, place.seen, place.chance)
 
     turned = versine(walk.direction, sun)
     falls = jnp.maximum(jnp.dot(here.up, sun), 0.0) / math.pi
-    falls = jnp.where(grounded, falls, phase(task, place.mixture, turned))
+    where = task.scene, task.wavelength
+    falls = jnp.where(grounded, falls, phase(*where, place.mixture, turned))
     passed, lit = to_sun(task.scene, here, sun)
     arrives = jnp.exp(-dot(passed, layers.extinction))
     counts = (walk.left > 0) & lit & (walk.order + 1 >= task.first)
@@ -99,9 +100,9 @@ def advance(task: Task, walk: Walk) -> Walk:
     weight = jnp.where(u[2] < stays, weight / stays, 0.0)
 
     direction, chance = depart(task, place, walk.direction, hero, order, u[3:], turn)
-    turned = phase(task, place.mixture, versine(walk.direction, direction))
+    turned = phase(*where, place.mixture, versine(walk.direction, direction))
     falls = jnp.maximum(jnp.dot(here.up, direction), 0.0) / math.pi
-    weight, ratio = _weigh(weight, ratio, jnp.where(grounded, falls, turned), chance)
+    weight, ratio = weigh(weight, ratio, jnp.where(grounded, falls, turned), chance)
 
     ended = ~jnp.any(weight > 0.0)
     fresh = begin(task, walk.start, walk.outward, walk.key, 0)
@@ -124,7 +125,7 @@ def advance(task: Task, walk: Walk) -> Walk:
     )
 
 
-def _weigh(
+def weigh(
     weight: Float[Array, "wl"],
     ratio: Float[Array, "wl"],
     seen: Float[Array, "#wl"],

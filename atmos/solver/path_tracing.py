@@ -8,47 +8,18 @@ from jaxtyping import Array, Float, Integer, PRNGKeyArray, Scalar
 
 from ..light import Sun
 from ..optics import check_layered
-from ..quantity import Direction, Number, Position, Radiance, Wavelength
+from ..quantity import Direction, Position, Wavelength
 from ..scene import Scene
 from ..transport import enter, extinctions
-from ._base import AbstractSolver, SolvedSky
 from ._collision import Task
 from ._flight import Layers
 from ._guess import prepare
+from ._tally import AbstractTracing, Tally
 from ._walk import advance, begin
 from .single_scattering import SingleScattering
 
 
-class Tally(eqx.Module):
-    """The mean of independent trials, and how much they scatter about it.
-
-    `squares` is the sum of the squared distances from the mean.
-    """
-
-    count: Number
-    mean: Float[Array, "*batch wl"]
-    squares: Float[Array, "*batch wl"]
-
-    @classmethod
-    def of(cls, trials: Float[Array, "trial *batch wl"]) -> "Tally":
-        mean = jnp.mean(trials, 0)
-        squares = jnp.sum((trials - mean[None]) ** 2, 0)
-        return cls(jnp.asarray(trials.shape[0], mean.dtype), mean, squares)
-
-    def join(self, other: "Tally") -> "Tally":
-        """That of both together (Chan, Golub and LeVeque 1983)."""
-        count = self.count + other.count
-        part = other.count / count
-        apart = other.mean - self.mean
-        squares = self.squares + other.squares + self.count * part * apart * apart
-        return Tally(count, self.mean + part * apart, squares)
-
-    @property
-    def standard_error(self) -> Float[Array, "*batch wl"]:
-        return jnp.sqrt(self.squares / (self.count * (self.count - 1.0)))
-
-
-class PathTracing(AbstractSolver):
+class PathTracing(AbstractTracing):
     """Light that turned any number of times, by random paths: right on average.
 
     Paths are followed backwards, from the eye, in `blocks` of `walks` times `paths`.
@@ -106,13 +77,13 @@ class PathTracing(AbstractSolver):
         self,
         prepared: Layers,
         scene: Scene,
-        light: Sun,
+        light: Sun | None,
         wavelength: Wavelength,
         positions: Float[Array, "look 3"],
         directions: Float[Array, "look 3"],
         first: Integer[Scalar, ""] | int = 0,
     ) -> Tally:
-        """What the paths find in each direction, in blocks from the `first` on."""
+        assert light is not None, "what shines was refused"
         once = 1 if self.single is None else 2
         task = Task(scene, prepared, light, wavelength, once)
         # Compiled once, for any number of blocks.
@@ -147,43 +118,3 @@ def _tally(
     dark = jnp.zeros((*positions.shape[:1], *task.wavelength.shape), directions.dtype)
     none = Tally(jnp.zeros_like(irradiance, shape=()), dark, dark)
     return jax.lax.fori_loop(0, blocks, block, none)
-
-
-class Estimate(eqx.Module):
-    """A radiance, and how far it is likely to be off."""
-
-    mean: Radiance
-    standard_error: Radiance
-
-
-@eqx.filter_jit
-def estimate(sky: SolvedSky, position: Position, direction: Direction) -> Estimate:
-    """What one sees, with its standard error.
-
-    Raises `ValueError` for a sky that is not path traced.
-    """
-    solver = sky.solver
-    if not isinstance(solver, PathTracing):
-        raise ValueError(f"`sky` must be traced by paths; got {type(solver).__name__}.")
-    total = jnp.zeros_like(sky.wavelength)
-    mean, variance = total, total
-    for light in sky.scene.lights:
-        tally = solver.tally(
-            sky.prepared,
-            sky.scene,
-            light,
-            sky.wavelength,
-            position[None],
-            direction[None],
-        )
-        mean += tally.mean[0]
-        variance += tally.standard_error[0] ** 2
-    if solver.single is not None:
-        once = SolvedSky(
-            scene=sky.scene,
-            solver=solver.single,
-            wavelength=sky.wavelength,
-            prepared=None,
-        )
-        mean += once.radiance(position, direction)
-    return Estimate(mean, jnp.sqrt(variance))

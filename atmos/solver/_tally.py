@@ -1,0 +1,109 @@
+import abc
+from typing import Any
+
+import equinox as eqx
+import jax.numpy as jnp
+from jaxtyping import Array, Float, Integer, PyTree, Scalar
+
+from ..light import Sun
+from ..quantity import Direction, Number, Position, Radiance, Wavelength
+from ..scene import Scene
+from ._base import AbstractSolver, SolvedSky
+from .single_scattering import SingleScattering
+
+
+class Tally(eqx.Module):
+    """The mean of independent trials, and how much they scatter about it.
+
+    `squares` is the sum of the squared distances from the mean.
+    """
+
+    count: Number
+    mean: Float[Array, "*batch wl"]
+    squares: Float[Array, "*batch wl"]
+
+    @classmethod
+    def of(cls, trials: Float[Array, "trial *batch wl"]) -> "Tally":
+        mean = jnp.mean(trials, 0)
+        squares = jnp.sum((trials - mean[None]) ** 2, 0)
+        return cls(jnp.asarray(trials.shape[0], mean.dtype), mean, squares)
+
+    def join(self, other: "Tally") -> "Tally":
+        """That of both together (Chan, Golub and LeVeque 1983)."""
+        count = self.count + other.count
+        part = other.count / count
+        apart = other.mean - self.mean
+        squares = self.squares + other.squares + self.count * part * apart * apart
+        return Tally(count, self.mean + part * apart, squares)
+
+    @property
+    def standard_error(self) -> Float[Array, "*batch wl"]:
+        return jnp.sqrt(self.squares / (self.count * (self.count - 1.0)))
+
+
+class AbstractTracing(AbstractSolver):
+    """Light by random paths: right on average, with a standard error.
+
+    Light that turned once comes from `single`, exactly; with None it is traced too.
+    """
+
+    single: eqx.AbstractVar[SingleScattering | None]
+
+    @abc.abstractmethod
+    def tally(
+        self,
+        prepared: PyTree[Any],
+        scene: Scene,
+        light: Sun | None,
+        wavelength: Wavelength,
+        positions: Float[Array, "look 3"],
+        directions: Float[Array, "look 3"],
+        first: Integer[Scalar, ""] | int = 0,
+    ) -> Tally:
+        """What the paths find in each direction, in blocks from the `first` on.
+
+        Of one light; or, with None, of the media that shine.
+        """
+
+
+class Estimate(eqx.Module):
+    """A radiance, and how far it is likely to be off."""
+
+    mean: Radiance
+    standard_error: Radiance
+
+
+@eqx.filter_jit
+def estimate(sky: SolvedSky, position: Position, direction: Direction) -> Estimate:
+    """What one sees, with its standard error.
+
+    Raises `ValueError` for a sky that is not path traced.
+    """
+    solver = sky.solver
+    if not isinstance(solver, AbstractTracing):
+        raise ValueError(f"`sky` must be traced by paths; got {type(solver).__name__}.")
+    total = jnp.zeros_like(sky.wavelength)
+    mean, variance = total, total
+    lights: list[Sun | None] = list(sky.scene.lights)
+    if any(x.emission is not None for x in sky.scene.media):
+        lights.append(None)
+    for light in lights:
+        tally = solver.tally(
+            sky.prepared,
+            sky.scene,
+            light,
+            sky.wavelength,
+            position[None],
+            direction[None],
+        )
+        mean += tally.mean[0]
+        variance += tally.standard_error[0] ** 2
+    if solver.single is not None:
+        once = SolvedSky(
+            scene=sky.scene,
+            solver=solver.single,
+            wavelength=sky.wavelength,
+            prepared=None,
+        )
+        mean += once.radiance(position, direction)
+    return Estimate(mean, jnp.sqrt(variance))

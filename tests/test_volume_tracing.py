@@ -1,0 +1,270 @@
+"""Light of all orders in clouds and fire, judged in standard errors."""
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from atmos.geometry import Flat
+from atmos.light import Sun
+from atmos.medium import (
+    Ball,
+    Box,
+    Exponential,
+    Glow,
+    Grid,
+    Medium,
+    Noise,
+    Product,
+    Puff,
+    Tabulated,
+    Transformed,
+)
+from atmos.phase import HenyeyGreenstein
+from atmos.scene import Scene
+from atmos.solver import estimate, PathTracing, RayMarching, solve, VolumeTracing
+from atmos.solver._majorants import cross, fly, Majorants
+from atmos.spectrum import PowerLaw
+
+
+NM = np.array([450.0, 650.0])
+LOWER, UPPER = np.array([-1.0, -1.0, 1.0]), np.array([1.0, 1.0, 3.0])
+SLANT = np.array([0.48, 0.36, 0.8])
+rng = np.random.default_rng(0)
+
+
+LOOKS = 64
+SOLVER = VolumeTracing(walks=8, paths=8)
+
+
+def cloud(profile, scattering, absorption, g, sun=SLANT, exponent=0.0):
+    coefficients = PowerLaw(scattering, exponent), absorption
+    medium = Medium(profile, *coefficients, HenyeyGreenstein(g))
+    return Scene(Flat(), 1e8, (medium,), (Sun(sun, 1.0, 0.0),))
+
+
+def tallied(scene, positions, directions):
+    """Means and standard errors, always of so many looks that tests share compilations.
+
+    In single precision, as pictures are made.
+    """
+    sky = solve(scene, SOLVER, jnp.asarray(NM, jnp.float32))
+    repeat = LOOKS // len(positions)
+    looks = [np.repeat(x, repeat, 0) for x in (positions, directions)]
+    # No two looks are alike, or they would be alike in all that is random too.
+    looks[0] = looks[0] * (1.0 + 1e-6 * rng.uniform(-1.0, 1.0, (LOOKS, 1)))
+    looks = [jnp.asarray(x, jnp.float32) for x in looks]
+    more = sky.prepared, sky.scene, sky.scene.lights[0], sky.wavelength
+    found = sky.solver.tally(*more, *looks)
+    parts = lambda x: np.asarray(x, float).reshape(-1, repeat, len(NM))
+    error = np.sqrt(np.mean(parts(found.standard_error) ** 2, 1) / repeat)
+    return np.mean(parts(found.mean), 1), error
+
+
+# Van de Hulst (1980), Multiple Light Scattering, tables 12 and 35: reflected and all
+# transmitted light of slabs of depth 1 under a sun in the zenith; asymmetry, albedo.
+SLABS = [
+    (0.0, 1.0, 0.34133, 0.65867),
+    (0.5, 1.0, 1.0 - 0.82389, 0.82389),
+    (0.5, 0.9, None, 0.73909),
+]
+# And, as nothing is lost, both together of white ones.
+WHITE = [-0.5, 0.6]
+
+
+def fluxes(g, albedo, depth=1.0):
+    """What is reflected and transmitted, each with its standard error."""
+    wide = np.array([1e5, 1e5, 0.0])
+    box = Box(np.array([0.0, 0.0, 1.0]) - wide, np.array([0.0, 0.0, 2.0]) + wide)
+    sun = np.array([0.0, 0.0, 1.0])
+    slab = cloud(box, depth * albedo, depth * (1.0 - albedo), g, sun)
+    # Evenly in the square of the cosine, as light leaves a surface.
+    up = np.sqrt((np.arange(LOOKS) + rng.uniform(size=LOOKS)) / LOOKS)
+    turn, level = rng.uniform(0.0, 2.0 * np.pi, LOOKS), np.sqrt(1.0 - up * up)
+    for sign, beam in ((-1.0, 0.0), (1.0, np.exp(-depth))):
+        looks = [level * np.cos(turn), level * np.sin(turn), sign * up]
+        start = np.broadcast_to([0.1, 0.2, 1.5 - sign], (LOOKS, 3))
+        flux = np.pi * tallied(slab, start, np.stack(looks, 1))[0].mean(1)
+        yield beam + flux.mean(), flux.std(ddof=1) / np.sqrt(LOOKS)
+
+
+@pytest.mark.parametrize("g, albedo, reflected, transmitted", SLABS)
+def test_a_slab_reflects_and_transmits_what_is_published(
+    g, albedo, reflected, transmitted
+):
+    dues = reflected, transmitted
+    for (flux, error), due in zip(fluxes(g, albedo), dues, strict=True):
+        assert error < 0.06 and (due is None or abs(flux - due) < 4.5 * error)
+
+
+@pytest.mark.parametrize("g", WHITE)
+def test_a_white_slab_loses_nothing(g):
+    (above, error), (below, other) = fluxes(g, 1.0, 2.0)
+    assert abs(above + below - 1.0) < 4.5 * np.hypot(error, other) < 0.4
+
+
+values = rng.uniform(0.0, 1.0, (5, 9, 7)) ** 4
+values[2, 5, 3] = 1e4
+TURN = np.array([[0.5, -0.4, 0.1], [0.4, 0.5, 0.0], [0.0, 0.2, 0.6]])
+PROFILES = {
+    "ball": Ball(np.array([0.2, 0.1, 2.0]), 0.7),
+    "grid": Grid(values, LOWER, UPPER),
+    "turned grid": Transformed(Grid(values, LOWER, UPPER), TURN, SLANT),
+    "puff": Puff(np.array([0.0, 0.0, 2.0]), 0.5, 0.4, octaves=2),
+    "bounded": Product(
+        Tabulated(np.array([0.0, 9.0]), np.array([3.0, 5.0])),
+        Product(Noise(0.3, octaves=2), Ball(np.array([0.2, 0.1, 2.0]), 0.7)),
+    ),
+}
+
+
+CELLS = 7
+
+
+def test_nothing_is_denser_than_its_bound():
+    at = jax.vmap(lambda profile, x: profile.density(Flat().locate(x)), (None, 0))
+    index = np.indices((CELLS,) * 3).reshape(3, -1).T
+    steps, places = [], []
+    for name, profile in PROFILES.items():
+        low, high = map(np.asarray, profile.box)
+        inside = rng.uniform(low, high, (5000, 3))
+        if name == "grid":  # and about the peak, where most is
+            peak = LOWER + (np.array([2, 5, 3]) + 0.5) / values.shape * (UPPER - LOWER)
+            inside[:100] = peak + rng.uniform(-1e-2, 1e-2, (100, 3))
+        places.append(inside)
+        steps.append((low, (high - low) / CELLS))
+
+    @jax.jit
+    def found(profiles):
+        dense = [at(x, jnp.asarray(y)) for x, y in zip(profiles, places, strict=True)]
+        bounds = [
+            jax.vmap(x.most)(jnp.asarray(low + index * step), low + step + index * step)
+            for x, (low, step) in zip(profiles, steps, strict=True)
+        ]
+        return dense, bounds
+
+    all_found = found(list(PROFILES.values()))
+    for name, dense, bound, place, (low, step) in zip(
+        PROFILES, *map(list, all_found), places, steps, strict=True
+    ):
+        bound = np.asarray(bound).reshape((CELLS,) * 3)
+        cell = np.clip(np.floor((place - low) / step), 0, CELLS - 1).astype(int)
+        assert np.all(dense <= bound[tuple(cell.T)] * (1.0 + 1e-9))
+        # A peak is paid for near it alone.
+        if "grid" in name:
+            assert np.median(bound) < 1e-2 * np.max(bound)
+            assert np.mean(bound == np.max(bound)) < 0.3
+
+
+def test_a_ray_meets_as_much_as_lies_in_its_cells():
+    bounds = rng.uniform(0.0, 1.0, (6, 6, 6)) ** 3
+    bounds[bounds < 0.1] = 0.0
+    cells = Majorants(*map(jnp.asarray, (LOWER, UPPER, bounds)))
+    start = rng.uniform(-4.0, 4.0, (40, 3))
+    aim = rng.uniform(LOWER, UPPER, (40, 3)) - start
+    aim = aim / np.linalg.norm(aim, axis=1)[:, None]
+
+    @jax.jit
+    @jax.vmap
+    def through(start, aim, depth):
+        return fly(cells, cross(cells, start, aim, jnp.asarray(100.0)), depth)
+
+    # A fine march through the same cells by midpoints.
+    s = (np.arange(20_000) + 0.5) * 6e-4
+    places = start[:, None] + s[:, None] * aim[:, None]
+    inside = np.all((places > LOWER) & (places < UPPER), -1)
+    index = np.clip(np.floor((places - LOWER) / (UPPER - LOWER) * 6), 0, 5).astype(int)
+    depth = np.cumsum(bounds[tuple(np.moveaxis(index, -1, 0))] * inside, 1) * 6e-4
+    looks = jnp.asarray(start), jnp.asarray(aim)
+    assert not np.any(through(*looks, jnp.asarray(1.01 * depth[:, -1] + 1e-3))[2])
+    ray, bound, met = through(*looks, jnp.asarray(0.5 * depth[:, -1]))
+    assert np.all(met) and np.all(bound > 0.0)
+    reached = [d[np.searchsorted(s, x)] for d, x in zip(depth, ray.at, strict=True)]
+    np.testing.assert_allclose(reached, 0.5 * depth[:, -1], atol=2e-3)
+
+
+GRID = Grid(np.ones((9, 9, 9)), LOWER, UPPER)
+BOX = Box(LOWER, UPPER)
+START = np.array([[0.0, -4.0, 2.0], [0.3, 0.2, 2.2], [3.0, 1.0, 4.0], [0.5, 0.0, 6.0]])
+AIM = np.array([[0.1, 1, 0.05], [0.01, 0.6, 0.8], [-1, -0.3, -0.7], [0.1, 0.2, -1]])
+AIM = AIM / np.linalg.norm(AIM, axis=1)[:, None]
+
+
+def test_light_of_dark_smoke_turns_once_and_is_as_it_is_marched_in_any_size():
+    sky = solve(cloud(BOX, 0.02, 2.0, 0.4), RayMarching(), NM)
+    look = eqx.filter_jit(jax.vmap(lambda sky, *ray: sky.radiance(*ray), (None, 0, 0)))
+    due = np.asarray(look(sky, jnp.asarray(START), jnp.asarray(AIM)))
+    for size in (1e-3, 1.0, 6.4e6):
+        box = Box(LOWER * size, UPPER * size)
+        smoke = cloud(box, 0.02 / size, 2.0 / size, 0.4)
+        mean, error = tallied(smoke, START * size, AIM)
+        # A hundredth scatters: of light that turned twice there is so little.
+        assert np.all(np.abs(mean - due) <= 4.5 * error + 0.01 * due)
+        assert np.all(error < 0.4 * due)
+
+
+def test_a_grid_and_a_box_look_alike_and_a_peak_aside_changes_nothing():
+    one = tallied(cloud(BOX, 1.0, 0.2, 0.4), START, AIM)
+    peak = np.ones((9, 9, 9))
+    peak[0, -1, 0] = 1e4  # in a corner that light hardly comes near
+    for other in (GRID, Grid(peak, LOWER, UPPER)):
+        other = tallied(cloud(other, 1.0, 0.2, 0.4), START, AIM)
+        spread = np.hypot(one[1], other[1])
+        assert np.all(np.abs(one[0] - other[0]) <= 4.5 * spread)
+        assert np.all(spread < 0.3 * one[0])
+    empty = tallied(
+        cloud(Grid(np.zeros((9, 9, 9)), LOWER, UPPER), 1.0, 0.2, 0.4), START, AIM
+    )
+    assert np.all(empty[0] == 0.0)
+
+
+def test_strong_colours_keep_their_variance():
+    # At one wavelength a hundred times thicker than at the other.
+    blue = cloud(BOX, 1.0, 2.0, 0.4, exponent=-12.5)
+    assert (650.0 / 450.0) ** 12.5 > 95.0
+    mean, error = tallied(blue, START, AIM)
+    assert np.all(np.isfinite(mean)) and np.all(error < mean)
+
+
+def test_light_that_is_never_absorbed_comes_to_an_end():
+    mean, _ = tallied(cloud(BOX, 500.0, 0.0, 0.0), START[3:], AIM[3:])
+    # A white wall, lit from above: no brighter than white in full light.
+    assert np.all((mean > 0.0) & (mean < 1.0 / np.pi))
+
+
+def test_fire_shines_and_lights_the_smoke_around_it():
+    middle, radius, glow, thin = np.array([0.0, 0.0, 2.0]), 0.3, 10.0, 0.1
+    fire = Medium(Ball(middle, radius), emission=Glow(glow))
+    smoke = Medium(Box(LOWER, UPPER), scattering=thin)
+    solver = VolumeTracing(walks=2048, paths=8, cells=4)
+    sky = solve(Scene(Flat(), 10.0, (fire, smoke), ()), solver, NM)
+    look = lambda x: estimate(
+        sky, jnp.asarray([x, -4.0, 2.0]), jnp.asarray([0, 1.0, 0])
+    )
+    found = look(0.0)
+    np.testing.assert_allclose(found.mean, glow * 2.0 * radius, rtol=0.1)
+    # Beside it one sees what has turned once: the integral over the ball and the ray.
+    inside = rng.uniform(-radius, radius, (4000, 3))
+    inside = inside[np.sum(inside**2, 1) < radius**2]
+    along = np.linspace(-0.99, 0.99, 100)
+    places = np.stack([0.8 + 0.0 * along, along, 0.0 * along], 1)
+    far = np.sum((places[:, None] - inside[None]) ** 2, -1)
+    volume = 4.0 / 3.0 * np.pi * radius**3
+    due = thin / (4.0 * np.pi) * glow * volume * np.mean(1.0 / far) * 2.0
+    found = look(0.8)
+    assert np.all(found.standard_error < 0.2 * due)
+    assert np.all(np.abs(found.mean - due) < 4.5 * found.standard_error + 0.15 * due)
+
+
+def test_what_it_does_not_hold_for_is_refused():
+    air = Scene(Flat(), 10.0, (Medium(Exponential(8e3), 1e-5),), ())
+    with pytest.raises(
+        ValueError, match=r"`scene.media\[0\].profile` must lie in a box"
+    ):
+        solve(air, VolumeTracing(), NM)
+    with pytest.raises(ValueError, match="`walks` must be at least 2; got 1"):
+        VolumeTracing(walks=1)
+    glows = Medium(GRID, emission=Glow(1.0))
+    with pytest.raises(ValueError, match="emission` must be None"):
+        solve(Scene(Flat(), 10.0, (glows,), ()), PathTracing(), NM)

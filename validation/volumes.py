@@ -1,0 +1,217 @@
+"""Light in clouds traced by null collisions, against tables and against Mitsuba.
+
+The tables are of slabs with the lobes of Henyey and Greenstein: what is reflected and
+transmitted over depth, albedo, asymmetry and sun (DISORT with 128 streams); a slab is a
+box much wider than high here. A z-score is an error in standard errors.
+
+Mitsuba's `volpath` renders the same cloud of 64 cubed cells, lit by one sun, with an
+albedo of 0.999 and an asymmetry of 0.85; pixels are compared one by one.
+
+    python -m validation.volumes --truth DIR
+"""
+
+import argparse
+import csv
+import sys
+import time
+from collections.abc import Iterator
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from atmos.geometry import Flat
+from atmos.light import Sun
+from atmos.medium import Box, Grid, Medium, Puff
+from atmos.phase import HenyeyGreenstein
+from atmos.scene import Scene
+from atmos.solver import solve, VolumeTracing
+
+from .claim import Claim, main
+
+
+WIDE = 1e5  # how much wider than high a slab is
+LOOKS = 1024  # directions for each flux
+SIZE, LOOKS_A_PIXEL = 16, 256
+
+
+def claims(arguments: argparse.Namespace) -> Iterator[Claim]:
+    if arguments.truth is not None:
+        yield from of_slabs(arguments.truth / "slab_reflectance_transmittance_hg.csv")
+    yield from of_mitsuba()
+
+
+def flux(row: dict[str, float], below: bool, seed: int) -> tuple[float, float]:
+    """What leaves a slab to one side, of a flux of 1 that enters, and its error."""
+    tau, albedo, sun = row["tau"], row["omega"], row["mu0"]
+    box = Box(np.array([-WIDE, -WIDE, 1.0]), np.array([WIDE, WIDE, 2.0]))
+    slab = Medium(box, tau * albedo, tau * (1.0 - albedo), HenyeyGreenstein(row["g"]))
+    light = Sun(np.array([np.sqrt(1.0 - sun * sun), 0.0, sun]), 1.0, 0.0)
+    solver = VolumeTracing(jax.random.key(seed), walks=4, paths=4, cells=1)
+    sky = solve(Scene(Flat(), 3.0, (slab,), (light,)), solver, jnp.array([550.0]))
+    rng = np.random.default_rng(seed)
+    # Stratified in the square of the cosine, so that looks share out the flux evenly.
+    up = np.sqrt((np.arange(LOOKS) + rng.uniform(size=LOOKS)) / LOOKS)
+    turn, level = rng.uniform(0.0, 2.0 * np.pi, LOOKS), np.sqrt(1.0 - up * up)
+    looks = [level * np.cos(turn), level * np.sin(turn), up if below else -up]
+    looks = jnp.asarray(np.stack(looks, 1), jnp.float32)
+    start = jnp.array([0.0, 0.0, 0.5 if below else 2.5], jnp.float32)
+    tally = sky.solver.tally(
+        sky.prepared,
+        sky.scene,
+        sky.scene.lights[0],
+        sky.wavelength,
+        jnp.broadcast_to(start, looks.shape),
+        looks,
+    )
+    # Looks differ by what they see, and by chance; that they are stratified makes the
+    # error a little smaller than this.
+    found = np.asarray(tally.mean, float)[:, 0] * np.pi / sun
+    return float(np.mean(found)), float(np.std(found, ddof=1) / np.sqrt(LOOKS))
+
+
+def of_slabs(path) -> Iterator[Claim]:
+    with open(path) as file:
+        lines = [x for x in file if not x.startswith("#")]
+    rows = [{k: float(v) for k, v in x.items()} for x in csv.DictReader(lines)]
+    scores, errors = [], []
+    for i, row in enumerate(rows):
+        due = row["R"], row["T_total"] - row["T_direct"]
+        for below in (False, True):
+            found, error = flux(row, below, 2 * i + below)
+            if due[below] > 1e-4:
+                scores.append((found - due[below]) / error)
+                errors.append(error)
+    scores = np.array(scores)
+    source = f"{len(scores)} fluxes"
+    yield Claim(
+        "slabs: largest error in standard errors", source, 4.5, max(abs(scores))
+    )
+    mean = abs(np.mean(scores)) * np.sqrt(len(scores))
+    yield Claim("slabs: mean z, in its standard errors", source, 3.0, mean)
+    yield Claim(
+        "slabs: spread of z, 1 if errors are right", source, 1.25, np.std(scores)
+    )
+    yield Claim(
+        "slabs: median standard error of a flux", source, None, np.median(errors)
+    )
+
+
+def cloud() -> Grid:
+    lower, upper = np.array([-1.0, -1.0, 1.0]), np.array([1.0, 1.0, 3.0])
+    puff = Puff(np.array([0.0, 0.0, 2.0]), 0.55, 0.6, octaves=4)
+    places = lower + (np.indices((64,) * 3).reshape(3, -1).T + 0.5) / 64 * 2.0
+    look = jax.vmap(lambda x: puff.density(Flat().locate(x)))
+    found = jax.jit(look)(jnp.asarray(places, jnp.float32))
+    return Grid(np.asarray(found).reshape((64,) * 3), lower, upper)
+
+
+SUN, EYE, VIEW = np.array([0.6, 0.0, 0.8]), np.array([0.0, -5.0, 2.0]), 0.5
+DENSE, ALBEDO, ASYMMETRY = 12.0, 0.999, 0.85
+
+
+def of_mitsuba() -> Iterator[Claim]:
+    grid = cloud()
+    start = time.perf_counter()
+    theirs = mitsubas(grid)
+    print(f"Mitsuba: {time.perf_counter() - start:.1f} s", file=sys.stderr)
+    start = time.perf_counter()
+    ours = traced(grid)
+    print(f"atmos: {time.perf_counter() - start:.1f} s", file=sys.stderr)
+    spread = np.sqrt(ours[1] ** 2 + theirs[1] ** 2)
+    seen = spread > 0.0
+    scores = (ours[0] - theirs[0])[seen] / spread[seen]
+    source = f"Mitsuba, {np.sum(seen)} pixels"
+    yield Claim(
+        "cloud: largest error in standard errors", source, 4.5, max(abs(scores))
+    )
+    yield Claim(
+        "cloud: spread of z, 1 if errors are right", source, 1.3, np.std(scores)
+    )
+    total = [np.sum(x[0]) for x in (ours, theirs)]
+    error = [np.sqrt(np.sum(x[1] ** 2)) for x in (ours, theirs)]
+    score = abs(total[0] - total[1]) / np.hypot(*error)
+    yield Claim("cloud: whole picture, in standard errors", source, 3.0, score)
+    error = np.hypot(*error) / total[1]
+    yield Claim("cloud: standard error of the whole, relative", source, None, error)
+
+
+def traced(grid: Grid) -> tuple[np.ndarray, np.ndarray]:
+    """Means of the pixels, and their standard errors."""
+    parts = DENSE * ALBEDO, DENSE * (1.0 - ALBEDO)
+    medium = Medium(grid, *parts, HenyeyGreenstein(ASYMMETRY))
+    scene = Scene(Flat(), 10.0, (medium,), (Sun(SUN, 1.0, 0.0),))
+    solver = VolumeTracing(walks=2, paths=8)
+    sky = solve(scene, solver, jnp.array([550.0]))
+    rng = np.random.default_rng(1)
+    y, x = np.indices((SIZE, SIZE))[..., None] + rng.uniform(
+        size=(2, SIZE, SIZE, LOOKS_A_PIXEL)
+    )
+    slope = np.tan(0.5 * VIEW)
+    right, down = ((2.0 * a / SIZE - 1.0) * slope for a in (x, y))
+    looks = np.stack([right, np.ones_like(x), -down], -1)
+    looks = looks / np.linalg.norm(looks, axis=-1, keepdims=True)
+    looks = jnp.asarray(looks.reshape(-1, 3), jnp.float32)
+    start = jnp.broadcast_to(jnp.asarray(EYE, jnp.float32), looks.shape)
+    light = sky.scene.lights[0]
+    more = sky.prepared, sky.scene, light, sky.wavelength, start, looks
+    found = np.asarray(sky.solver.tally(*more).mean).reshape(SIZE, SIZE, -1)
+    return found.mean(-1), found.std(-1, ddof=1) / np.sqrt(LOOKS_A_PIXEL)
+
+
+def mitsubas(grid: Grid, count: int = 32) -> tuple[np.ndarray, np.ndarray]:
+    """The same by so many pictures of Mitsuba's."""
+    import mitsuba as mi
+
+    mi.set_variant("scalar_rgb")
+    # Its grids are counted from z to x, its boxes are from 0 to 1.
+    values = np.ascontiguousarray(np.asarray(grid.values).transpose(2, 1, 0)[..., None])
+    place = mi.ScalarTransform4f().translate([-1, -1, 1]).scale([2, 2, 2])
+    box = mi.ScalarTransform4f().translate([0, 0, 2])
+    toward = mi.ScalarTransform4f().look_at(EYE.tolist(), [0, 0, 2], [0, 0, 1])
+    medium = {
+        "type": "heterogeneous",
+        "sigma_t": {
+            "type": "gridvolume",
+            "grid": mi.VolumeGrid(values.astype(np.float32)),
+            "to_world": place,
+        },
+        "albedo": ALBEDO,
+        "scale": DENSE,
+        "phase": {"type": "hg", "g": ASYMMETRY},
+    }
+    scene = mi.load_dict(
+        {
+            "type": "scene",
+            "integrator": {"type": "volpath", "max_depth": 100_000, "rr_depth": 1000},
+            "cloud": {
+                "type": "cube",
+                "to_world": box,
+                "bsdf": {"type": "null"},
+                "interior": medium,
+            },
+            "sun": {
+                "type": "directional",
+                "direction": (-SUN).tolist(),
+                "irradiance": {"type": "rgb", "value": 1.0},
+            },
+            "sensor": {
+                "type": "perspective",
+                "fov": float(np.degrees(VIEW)),
+                "to_world": toward,
+                "film": {
+                    "type": "hdrfilm",
+                    "width": SIZE,
+                    "height": SIZE,
+                    "rfilter": {"type": "box"},
+                },
+                "sampler": {"type": "independent", "sample_count": 32},
+            },
+        }
+    )
+    many = [np.array(mi.render(scene, seed=i))[..., 0] for i in range(count)]
+    return np.mean(many, 0), np.std(many, 0, ddof=1) / np.sqrt(count)
+
+
+if __name__ == "__main__":
+    sys.exit(main(__doc__, claims))
