@@ -148,8 +148,9 @@ class Peaks(eqx.Module):
         ratio = jnp.where(some, share / jnp.where(some, share[:1], 1.0), 0.0)
         ratio = jnp.clip(ratio, -1.0, 1.0)
         zeroth = contract("sn,nl->sl", passed, peak[:, 0])
-        values = [_orders(x * zeroth, depth) / x for x in _RATIOS.tolist()]
-        values = contract("sm,ksl->kml", event, jnp.stack(values))
+        known = jnp.asarray(_RATIOS, depth.dtype)[:, None, None]
+        values = _orders(known * zeroth[None], depth[None]) / known
+        values = contract("sm,ksl->kml", event, values)
         again = contract("nk,kml->nml", jnp.asarray(_CHEBYSHEV, least.dtype), values)
         before, row = jnp.ones_like(ratio), ratio
         mixed = again[0][:, None]
