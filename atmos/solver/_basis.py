@@ -19,6 +19,7 @@ class Basis(NamedTuple):
     """
 
     nodes: int
+    degrees: int
     orders: np.ndarray  # m
     cosine: np.ndarray  # row
     weight: np.ndarray  # row
@@ -32,27 +33,30 @@ class Basis(NamedTuple):
 
 
 @ft.cache
-def basis(nodes: int, polarised: int, begin: int, end: int) -> Basis:
-    """Of the orders from `begin` on, below `end`; twice as many degrees as `nodes`."""
+def basis(nodes: int, count: int, polarised: int, begin: int, end: int) -> Basis:
+    """Of the orders from `begin` on, below `end`, and the degrees below `count`."""
     mu, w = gauss_legendre(nodes)
-    orders, streams = np.arange(begin, end), 2 * nodes
+    orders = np.arange(begin, end)
     last = lambda x: np.moveaxis(x, 0, -1)[:, begin:end]  # l, m, node
-    p = last(harmonics(mu, streams))
-    degrees = [np.arange(streams)] + [np.arange(polarised)] * 2
+    p = harmonics(mu, count)
+    if 2 * count <= 3 * nodes:
+        p = _orthogonal(p, w)
+    p = last(p)
+    degrees = [np.arange(count)] + [np.arange(polarised)] * 2
     functions, cosine, weight = p, mu, w
     if polarised:
-        r, s = (last(x)[:polarised] for x in spin_harmonics(mu, streams))
+        r, s = (last(x)[:polarised] for x in spin_harmonics(mu, count))
         none, less = np.zeros_like(p), np.zeros_like(r)
         rows = [[p, none, none], [less, r, s], [less, s, r]]
         functions = np.concatenate([np.concatenate(x, -1) for x in rows])
         cosine, weight = np.tile(mu, 3), np.tile(w, 3)
     degrees = np.concatenate(degrees)
-    odd_one = np.arange(len(degrees)) >= streams + polarised  # B
+    odd_one = np.arange(len(degrees)) >= count + polarised  # B
     even = (degrees[:, None] + orders[None] + odd_one[:, None]) % 2 == 0
 
     # Which terms a coefficient joins: one with itself, or T with E.
     t, e = np.arange(len(degrees)), np.arange(polarised)
-    into, out_of = np.append(t, streams + e), np.append(t, e)
+    into, out_of = np.append(t, count + e), np.append(t, e)
     scale = np.sqrt(weight / cosine)
     scaled = functions * scale * np.sqrt(2.0 * degrees[:, None, None] + 1.0)
     both = np.einsum("qmi,qmj->ijmq", scaled[into], scaled[out_of])
@@ -61,9 +65,10 @@ def basis(nodes: int, polarised: int, begin: int, end: int) -> Basis:
     kinds = even[into].T
     twice = np.where(orders == 0, 1.0, 2.0) / (2.0 * math.pi)
     reach = np.einsum("qmi,m->imq", functions[into] * scale, twice)
-    reach = reach * np.where(out_of < streams, 2.0 * degrees[into] + 1.0, 0.0)
+    reach = reach * np.where(out_of < count, 2.0 * degrees[into] + 1.0, 0.0)
     return Basis(
         nodes,
+        count,
         orders,
         cosine,
         weight,
@@ -75,3 +80,21 @@ def basis(nodes: int, polarised: int, begin: int, end: int) -> Basis:
         degrees[into],
         even[into],
     )
+
+
+def _orthogonal(p: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """The nearest to harmonics [node, l, m] that are orthogonal at the nodes.
+
+    As they are on half of the sphere where l + m is even, or odd: Gauss's rule is not
+    exact for the products of the highest degrees, and what scattered twice would gain
+    by it in the directions of the beam.
+    """
+    found = p.copy()
+    root = np.sqrt(weight)[:, None]
+    for m in range(p.shape[2]):
+        for first in (m, m + 1):
+            l = np.arange(first, p.shape[1], 2)
+            norm = root * np.sqrt(2.0 * l + 1.0)
+            u, _, v = np.linalg.svd(norm * p[:, l, m], full_matrices=False)
+            found[:, l, m] = (u @ v) / norm
+    return found

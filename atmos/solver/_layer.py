@@ -12,7 +12,8 @@ from jaxtyping import Array
 # The largest half thickness of a slice, along the lowest ordinate or the beam, for
 # which the ratio of polynomials below is good to 1e-10.
 START = 0.5
-_MOST = 32  # doublings: more than for an optical depth of 1e6
+# Doublings: more than for an optical depth of 1e6; and how many of them in a block.
+_MOST, _BLOCK = 32, 4
 _PADE = (1.0, 1.0 / 2.0, 1.0 / 9.0, 1.0 / 72.0, 1.0 / 1008.0, 1.0 / 30240.0)
 
 
@@ -50,15 +51,23 @@ def _doubled(state, doublings):
 
 @_doubled.defjvp
 def _(primals, tangents):
-    # A loop whose length is known, so that it can be run backwards.
+    # Loops whose lengths are known, so that they can be run backwards: blocks of them,
+    # most of which are passed by, so that few states are kept.
     doublings = primals[1]
 
-    def maybe(state, i):
-        twice = jax.checkpoint(_double)
-        return jax.lax.cond(i < doublings, twice, lambda x: x, state), None
+    def maybe(function):
+        def step(state, i):
+            twice = jax.checkpoint(lambda x: function(x, i))
+            return jax.lax.cond(i < doublings, twice, lambda x: x, state), None
 
-    steps = jnp.arange(_MOST, dtype=doublings.dtype)
-    loop = lambda state: jax.lax.scan(maybe, state, steps)[0]
+        return step
+
+    def block(state, first):
+        steps = first + jnp.arange(_BLOCK, dtype=doublings.dtype)
+        return jax.lax.scan(maybe(lambda x, _: _double(x)), state, steps)[0]
+
+    steps = jnp.arange(0, _MOST, _BLOCK, dtype=doublings.dtype)
+    loop = lambda state: jax.lax.scan(maybe(block), state, steps)[0]
     return jax.jvp(loop, primals[:1], tangents[:1])
 
 
@@ -80,6 +89,7 @@ def identity(a: Array) -> Array:
     return jnp.broadcast_to(eye.reshape(eye.shape + (1,) * (a.ndim - 2)), a.shape)
 
 
+@jax.custom_jvp
 def product(a: Array, x: Array) -> Array:
     """Of matrices, with each other or with the vectors of every sun.
 
@@ -91,6 +101,18 @@ def product(a: Array, x: Array) -> Array:
         return total + a[:, k][:, None] * x[k][None]
 
     return jax.lax.fori_loop(0, a.shape[0], add, jnp.zeros_like(x))
+
+
+@product.defjvp
+def _(primals, tangents):
+    # In one operation: backwards, a loop would keep and add up all of its steps.
+    a, x = primals
+    more, other = tangents
+    return product(a, x), _at_once(more, x) + _at_once(a, other)
+
+
+def _at_once(a: Array, x: Array) -> Array:
+    return jnp.einsum("ik...,kc...->ic...", a, x, precision="highest")
 
 
 def _transposed(a: Array) -> Array:
@@ -115,4 +137,4 @@ def inverse_of(a: Array) -> Array:
 @inverse_of.defjvp
 def _(primals, tangents):
     inverse = inverse_of(*primals)
-    return inverse, -product(inverse, product(tangents[0], inverse))
+    return inverse, -_at_once(inverse, _at_once(tangents[0], inverse))

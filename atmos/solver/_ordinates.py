@@ -50,31 +50,33 @@ def solve_column(
     cosine: Float[Array, "sun"],
     albedo: Float[Array, "wl"],
     polarised: Float[Array, "layer k 3 wl"],
+    *,
+    nodes: int,
 ) -> Diffuse:
     """The diffuse light in layers, top first, over a Lambertian ground.
 
-    `scattering` is the depth of scattering times the moments of the phase function, an
-    even number of them: as many streams. `polarised` is that times the moments of
-    polarisation; with no degree of these it is radiance alone that is found. `slant`
-    is the optical depth along the beam to each level, and `cosine` that of the zenith
-    angle of where it comes from.
+    `scattering` is the depth of scattering times the moments of the phase function, no
+    more than twice the ordinates to either side, `nodes`. `polarised` is that times the
+    moments of polarisation; with no degree of these it is radiance alone that is found.
+    `slant` is the optical depth along the beam to each level, and `cosine` that of the
+    zenith angle of where it comes from.
     """
-    streams, k = scattering.shape[1], polarised.shape[1]
+    count, k = scattering.shape[1], polarised.shape[1]
     matrix = [scattering, *(polarised[:, :, i] for i in range(3))]
     solve = lambda made, known: _solve(made, depth, known, slant, cosine, albedo)
     # Orders of azimuth that polarisation has no part in are solved without it.
-    parts = (
-        [solve(basis(streams // 2, 0, k, streams), scattering)] if k < streams else []
-    )
+    parts = []
     if k:
-        made = basis(streams // 2, k, 0, k)
-        parts.insert(0, solve(made, jnp.concatenate(matrix, 1)))
-    l, m = pairs(streams)
-    radiance = jnp.concatenate([x[:, :, :, :streams] for x, _, _ in parts], 2)
+        made = basis(nodes, count, k, 0, k)
+        parts.append(solve(made, jnp.concatenate(matrix, 1)))
+    if k < count:
+        parts.append(solve(basis(nodes, count, 0, k, count), scattering))
+    l, m = pairs(count)
+    radiance = jnp.concatenate([x[:, :, :, :count] for x, _, _ in parts], 2)
     moments = [radiance[:, :, m, l]]
     if k:
         l, m = pairs(k)
-        rest = parts[0][0][:, :, :, streams:]
+        rest = parts[0][0][:, :, :, count:]
         moments += [rest[:, :, m, l], rest[:, :, m, k + l]]
     return Diffuse(jnp.concatenate(moments, 2), *parts[0][1:])
 
@@ -86,7 +88,6 @@ def _solve(
 
     `scattering` has the coefficients that are those of the basis.
     """
-    streams = 2 * made.nodes
     constant = lambda x: jnp.asarray(x, depth.dtype)
     scale = np.sqrt(made.weight / made.cosine)
 
@@ -94,7 +95,7 @@ def _solve(
     turn = constant(made.sums), constant(made.differences)
     along = constant(np.diag(1.0 / made.cosine)[:, :, None, None])
     # What scatters out of the beam.
-    beam = jnp.moveaxis(harmonics(-cosine, streams), 0, -1)
+    beam = jnp.moveaxis(harmonics(-cosine, made.degrees), 0, -1)
     beam = beam[made.degree][:, made.orders]
     reach = constant(made.reach)
     beam = jnp.einsum("imq,qms->ismq", reach, beam, precision="highest")

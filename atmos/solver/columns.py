@@ -8,13 +8,14 @@ from jaxtyping import Array, Bool, Float
 
 from ..geometry import Flat
 from ..light import Sun
-from ..optics import check_layered, layers, mixture
+from ..optics import check_layered, layers
 from ..quantity import Angle, deg, Direction, Irradiance, Length, Position, Wavelength
 from ..scene import Scene
 from ..transport import columns, extinctions
 from ._base import AbstractSolver, check_stokes
 from ._diffuse import Field
 from ._ordinates import solve_column
+from ._peaks import Peaks
 from ._suns import FlatSuns, RoundSuns
 from .single_scattering import SingleScattering
 
@@ -34,15 +35,23 @@ class Fluxes(eqx.Module):
     direct: Irradiance
 
 
+class Diffused(eqx.Module):
+    """Diffuse light, and the forward peaks of media that it does not notice."""
+
+    field: Field
+    peaks: Peaks
+
+
 class Columns(AbstractSolver):
     """All orders of scattering, as if the air lay flat around every place.
 
     Discrete ordinates, half of `streams` to either side, without the forward peaks of
     phase functions (delta-M, Wiscombe 1977), in `layers` layers; light that turned once
-    is added in the round and with its peak (Nakajima and Tanaka 1988). Diffuse light is
-    kept by altitude and, where the world is round, for `suns` zenith angles of each
-    light, whose rays reach a column along their own curved way. A line of sight takes
-    `nodes` places in each of `pieces` pieces.
+    is added in the round and with its peak (Nakajima and Tanaka 1988), and so is what
+    peaks alone turned more than once. Diffuse light is kept by altitude and, where the
+    world is round, for `suns` zenith angles of each light, whose rays reach a column
+    along their own curved way. A line of sight takes `nodes` places in each of `pieces`
+    pieces.
 
     With `stokes` 3 the light is polarised, which changes its radiance too.
 
@@ -68,6 +77,16 @@ class Columns(AbstractSolver):
                 f"`streams` must be at least 4 where `stokes` is 3; got {self.streams}."
             )
 
+    @property
+    def degrees(self) -> int:
+        """How many moments of phase functions are resolved, of all but their peaks.
+
+        As many as there are streams while these are few. Of many, what scatters from
+        one ordinate to another has too high a degree for Gauss's rule on half of the
+        sphere, and a sharp peak is better left to `_peaks`.
+        """
+        return max(min(self.streams, 16), 2 * (5 * self.streams // 16))
+
     def check(self, scene: Scene, wavelength: Wavelength) -> Scene:
         check_layered(scene)
         if isinstance(scene.geometry, Flat):
@@ -82,8 +101,9 @@ class Columns(AbstractSolver):
                 )
         return scene
 
-    def prepare(self, scene: Scene, wavelength: Wavelength) -> Field:
-        mixed = mixture(scene, wavelength, self.streams + 1, self.stokes).truncated()
+    def prepare(self, scene: Scene, wavelength: Wavelength) -> Diffused:
+        peaks = Peaks.of(scene, wavelength, self.degrees, self.stokes)
+        mixed = peaks.without
         cut = layers(scene, mixed.extinction, self.layers)
         lights = jnp.array([x.zenith for x in scene.lights], wavelength.dtype)
         last = 0.5 * jnp.pi + scene.geometry.dip(scene.top, jnp.zeros_like(scene.top))
@@ -105,9 +125,10 @@ class Columns(AbstractSolver):
             jnp.cos(zeniths),
             albedo,
             total(mixed.polarised)[::-1],
+            nodes=self.streams // 2,
         )
         turned = lambda x: jnp.swapaxes(x[::-1], 0, 1)
-        return Field(
+        field = Field(
             mixed,
             cut.altitude,
             suns,
@@ -117,34 +138,28 @@ class Columns(AbstractSolver):
             jnp.zeros((len(zeniths), len(cut.altitude)), wavelength.dtype),
             self.stokes,
         )
+        return Diffused(field, peaks)
 
     def scattered(
         self,
-        prepared: Field,
+        prepared: Diffused,
         scene: Scene,
         light: Sun,
         wavelength: Wavelength,
         position: Position,
         direction: Direction,
     ) -> Float[Array, "part wl"]:
-        extinction = prepared.mixture.extinction
-        once = self.single.march(
-            scene, extinction, light, wavelength, position, direction
-        )
-        more = prepared.gather(
-            scene,
-            light,
-            wavelength,
-            position,
-            direction,
-            pieces=self.pieces,
-            nodes=self.nodes,
-        )
-        return jnp.concatenate([once[:-1], once[-1:] + more[:1], more[1:]])
+        look = scene, light, wavelength, position, direction
+        field, peaks = prepared.field, prepared.peaks
+        once = self.single.march(scene, peaks.within.extinction, *look[1:])
+        ahead = peaks.scattered(*look, pieces=self.pieces)
+        more = field.gather(*look, pieces=self.pieces, nodes=self.nodes)
+        once = once.at[-1].add(ahead + more[0])
+        return jnp.concatenate([once, more[1:]])
 
     def fluxes(
         self,
-        prepared: Field,
+        prepared: Diffused,
         scene: Scene,
         light: Sun,
         wavelength: Wavelength,
@@ -154,7 +169,7 @@ class Columns(AbstractSolver):
         point = scene.geometry.locate(position)
         rise = jnp.maximum(jnp.dot(point.up, light.direction), 0.0)
         irradiance = light.irradiance.evaluate(wavelength)
-        up, down = prepared.fluxes(light, point)
+        up, down = prepared.field.fluxes(light, point)
         path = scene.geometry.path(point, light.direction)
         found = columns(scene, path, path.span(scene.top).far, nodes=16)
         passed = lambda x: (
@@ -162,7 +177,7 @@ class Columns(AbstractSolver):
         )
         direct = passed(extinctions(scene, wavelength))
         # What went on in the forward peak is no more direct.
-        ahead = passed(prepared.mixture.extinction) - direct
+        ahead = passed(prepared.peaks.without.extinction) - direct
         return Fluxes(up * irradiance, (down + ahead) * irradiance, direct * irradiance)
 
 

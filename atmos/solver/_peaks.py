@@ -1,0 +1,186 @@
+"""Light that turned more than once in the narrow forward peaks of phase functions.
+
+Delta-M takes a peak as not scattered at all. Of light that met nothing but peaks, and
+that arrives through columns with the extinction t and the Legendre moments x of their
+peaks, the sum of all orders is
+
+    e^-t (e^x - 1) / x
+
+times the peaks where it turned: as if they left it on its way, the moments of n turns
+are those of one to the power of n, and any of these may be counted as the one that led
+from the sun's ray to the line of sight. Ahead that is exact, and elsewhere too where
+one turn is wide and the others narrow. At second order in x it is the correction in
+the aureole by Nakajima and Tanaka (1988).
+"""
+
+import math
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from ..light import Sun
+from ..optics import Mixture, mixture
+from ..quantity import Direction, Position, Radiance, Versine, versine, Wavelength
+from ..scene import Scene
+from ..transport import (
+    columns,
+    contract,
+    cumulative,
+    densities,
+    enter,
+    gauss_legendre,
+)
+from ._sight import cut
+
+
+# Degrees of the moments of peaks: what is yet narrower turns light once at most.
+# Even, so that lobes to the back leave a share above 0 as well.
+_DEGREES = 128
+# Places in a piece of a line of sight, and of the way from there to the sun.
+_NODES, _LIGHT_NODES = 3, 8
+# The sum of orders is a polynomial in x over that of degree 0: known at as many places.
+_ORDER = 8
+_TURN = math.pi * (np.arange(_ORDER) + 0.5) / _ORDER
+_RATIOS = np.cos(_TURN)
+_CHEBYSHEV = np.cos(np.arange(_ORDER)[:, None] * _TURN) * (2.0 / _ORDER)
+_CHEBYSHEV[0] *= 0.5
+
+
+class Peaks(eqx.Module):
+    """The media of a scene without their forward peaks, and with all but their tips.
+
+    `without` are the media that diffuse light notices, their peaks not scattered. Light
+    that turned once is to be found with the extinction of `within`.
+    """
+
+    without: Mixture
+    within: Mixture
+
+    @classmethod
+    def of(
+        cls, scene: Scene, wavelength: Wavelength, degrees: int, stokes: int = 1
+    ) -> "Peaks":
+        """Peaks are what so many moments do not resolve."""
+        broad = mixture(scene, wavelength, degrees + 1, stokes)
+        fine = mixture(scene, wavelength, max(_DEGREES, degrees) + 1)
+        return cls(broad.truncated(), fine.truncated())
+
+    def scattered(
+        self,
+        scene: Scene,
+        light: Sun,
+        wavelength: Wavelength,
+        position: Position,
+        direction: Direction,
+        *,
+        pieces: int,
+    ) -> Radiance:
+        """What light that turned in peaks adds to that which turned once."""
+        path, far, grounded = enter(scene, position, direction)
+        gone, met = self.without.extinction, self.within.extinction
+        begin, length = cut(scene, path, far, gone, pieces)
+        u, w = (jnp.asarray(x, far.dtype) for x in gauss_legendre(_NODES))
+        places = begin[:, None] + length[:, None] * u[None]
+        begins, ends = path.shadow(light.direction, jnp.zeros_like(far))
+        lit = (places <= begins) | (places >= ends)
+
+        def ahead(place):
+            point = path.at(place)
+            sunwards = scene.geometry.path(point, light.direction)
+            end = sunwards.span(scene.top).far
+            found = columns(scene, sunwards, end, nodes=_LIGHT_NODES)
+            return densities(scene, point), found, jnp.dot(point.up, light.direction)
+
+        # The last of the places is where the line of sight ends.
+        found = jax.vmap(ahead)(jnp.append(places.ravel(), far))
+        cells = lambda x: x[:-1].reshape(*places.shape, -1)
+        density, sunwards, rise = found
+        amount = cells(density) * length[:, None, None]
+        whole = contract("j,pjm->pm", w, amount)
+        inner = jnp.asarray(cumulative(_NODES), far.dtype)
+        before = jnp.cumsum(whole, 0) - whole
+        passed = before[:, None] + contract("ij,pjm->pim", inner, amount)
+        passed = passed + cells(sunwards)
+        event = jnp.where(lit[:, :, None], amount * w[None, :, None], 0.0)
+        flat = lambda x: x.reshape(-1, x.shape[-1])
+        event, passed = flat(event), flat(passed)
+        depth = lambda columns, x: contract("...m,ml->...l", columns, x)
+        turned = self._turned(
+            event,
+            passed,
+            jnp.exp(-depth(passed, gone)),
+            depth(passed, met),
+            versine(direction, light.direction),
+        )
+
+        passed = jnp.sum(whole, 0) + sunwards[-1]
+        more = jnp.exp(-depth(passed, gone)) - jnp.exp(-depth(passed, met))
+        ground = (
+            scene.ground.evaluate(wavelength) / math.pi * jnp.maximum(rise[-1], 0.0)
+        )
+        shown = grounded & ~((begins < far) & (far < ends))
+        total = turned + jnp.where(shown, ground * more, 0.0)
+        return total * light.irradiance.evaluate(wavelength)
+
+    def _turned(
+        self,
+        event: Float[Array, "place medium"],
+        passed: Float[Array, "place medium"],
+        most: Float[Array, "place wl"],
+        depth: Float[Array, "place wl"],
+        versine: Versine,
+    ) -> Float[Array, "wl"]:
+        """Of light that passed such columns, `most` of which is left without peaks."""
+        broad, fine = self.without.scattering, self.within.scattering
+        missing = fine.shape[1] - broad.shape[1]
+        broad = jnp.pad(broad, ((0, 0), (0, missing), (0, 0)))
+        peak = fine - broad
+        least = jnp.exp(-depth)
+        once = contract("sm,sl->ml", event, most - least)
+
+        # The moments along the way over that of degree 0, as on average.
+        seen = contract("sm,ml->sl", event, peak[:, 0]) * most
+        share = contract("nl,nkl->kl", contract("sl,sn->nl", seen, passed), peak)
+        some = share[:1] > 0.0
+        ratio = jnp.where(some, share / jnp.where(some, share[:1], 1.0), 0.0)
+        ratio = jnp.clip(ratio, -1.0, 1.0)
+        zeroth = contract("sn,nl->sl", passed, peak[:, 0])
+        known = jnp.asarray(_RATIOS, depth.dtype)[:, None, None]
+        values = _orders(known * zeroth[None], depth[None]) / known
+        values = contract("sm,ksl->kml", event, values)
+        again = contract("nk,kml->nml", jnp.asarray(_CHEBYSHEV, least.dtype), values)
+        before, row = jnp.ones_like(ratio), ratio
+        mixed = again[0][:, None]
+        for x in again[1:]:
+            mixed = mixed + x[:, None] * row[None]
+            before, row = row, 2.0 * ratio * row - before
+
+        lobe = _legendre(versine, fine.shape[1])
+        source = broad * once[:, None] + peak * ratio[None] * mixed
+        return contract("k,mkl->l", lobe, source)
+
+
+def _orders(x: Array, depth: Array) -> Array:
+    """e^-depth ((e^x - 1) / x - 1), without overflow where x and depth are large."""
+    size = jnp.abs(x)
+    some = jnp.where(size > 0.0, size, 1.0)
+    share = jnp.where(size > 0.0, -jnp.expm1(-some) / some, 1.0)
+    return jnp.exp(jnp.maximum(x, 0.0) - depth) * share - jnp.exp(-depth)
+
+
+def _legendre(versine: Versine, count: int) -> Float[Array, "l"]:
+    """Legendre polynomials of a cosine, times (2l + 1) / (4 pi)."""
+
+    def following(state, l):
+        # By its distance from the last one, exact where the versine is small.
+        known, step = state
+        step = (l * step - (2.0 * l + 1.0) * versine * known) / (l + 1.0)
+        return (known + step, step), (2.0 * l + 1.0) * known
+
+    start = jnp.ones_like(versine), jnp.zeros_like(versine)
+    degrees = jnp.arange(count, dtype=versine.dtype)
+    _, found = jax.lax.scan(following, start, degrees)
+    return found / (4.0 * math.pi)
