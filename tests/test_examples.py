@@ -7,6 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from atmos import colour, render, solve
+from atmos.solver import QUICK
 from atmos.transport import direct_irradiance
 
 
@@ -22,7 +23,7 @@ def load(name):
 
 def test_skies(tmp_path):
     skies = load("skies")
-    pictures = skies.main(tmp_path, 8)
+    pictures = skies.main(tmp_path, 8, QUICK)
     assert {x.stem for x in tmp_path.iterdir()} == {*pictures, "skies"}
     luminance = {name: np.asarray(xyz)[..., 1] for name, xyz in pictures.items()}
     assert all(np.all(np.isfinite(x) & (x >= 0.0)) for x in luminance.values())

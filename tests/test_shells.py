@@ -16,6 +16,7 @@ from atmos.phase import HenyeyGreenstein, Rayleigh
 from atmos.scene import Scene
 from atmos.solver import Columns, Shells, SingleScattering, solve
 from atmos.solver._krylov import fixed_point
+from atmos.solver.shells import Solution
 
 
 NM = np.array([500.0])
@@ -187,10 +188,15 @@ def test_what_is_not_round_or_not_layered_is_refused():
         solve(uneven, SHELLS, NM)
 
 
-def test_too_few_orders_are_refused():
-    few = Shells(**SIZES, orders=2)
-    with pytest.raises(ValueError, match="within 2 `orders`; what is missing is 0"):
-        solve(numbers(), few, NM)
+def test_what_is_not_solved_to_the_tolerance_is_refused():
+    field = solve(numbers(), SHELLS, NM).prepared.field
+    with pytest.raises(
+        ValueError, match="within 200 `orders`; what is missing is 0.02"
+    ):
+        SHELLS.found(Solution(field, jnp.array(0.02)))
+    never = lambda x: -2.0 * x
+    _, error = fixed_point(never, jnp.ones((3, 1)), 1e-9, 0)
+    assert error == 1.0
 
 
 def test_a_fixed_point_solves_its_equations():

@@ -141,7 +141,7 @@ def _between(
 
     A cubic between two levels whose slope at either is that of the parabola through it
     and its neighbours (Catmull and Rom 1974, for uneven steps); a straight line's at
-    the ends.
+    the ends, and beside a thin layer, beyond which light may change otherwise.
     """
     last = len(altitude) - 1
     i = jnp.searchsorted(altitude, here, side="right") - 1
@@ -152,7 +152,7 @@ def _between(
 
     def slope(side):
         """What the value at the level itself, and that beyond it, add to the slope."""
-        known = side > 0.0
+        known = side > 0.25 * step
         ratio = step / jnp.where(known, side, 1.0)
         beyond = jnp.where(known, ratio * ratio / (1.0 + ratio), 0.0)
         return beyond, jnp.where(known, 1.0 / (1.0 + ratio), 1.0)
