@@ -39,11 +39,11 @@ def skies(size):
     ]
 
 
-def main(folder, size, solver):
+def main(folder, wanted, solver):
     """Writes the pictures, and all in one, into a folder, and returns their XYZ."""
     response = colour.response(WAVELENGTH)
     pictures, shown, solved = {}, [], {}
-    for name, scene, camera in skies(size):
+    for name, scene, camera in wanted:
         # One solution serves all suns of a planet.
         planet = float(scene.geometry.radius)
         if planet not in solved:
@@ -60,4 +60,4 @@ def main(folder, size, solver):
 
 
 if __name__ == "__main__":
-    main(pathlib.Path(sys.argv[1] if sys.argv[1:] else "."), 320, Shells())
+    main(pathlib.Path(sys.argv[1] if sys.argv[1:] else "."), skies(320), Shells())

@@ -23,7 +23,10 @@ def load(name):
 
 def test_skies(tmp_path):
     skies = load("skies")
-    pictures = skies.main(tmp_path, 8, QUICK)
+    # By day and by light that turned once: the others are the same lines of code.
+    day = ["noon", "sunset", "mars", "orbit"]
+    wanted = [x for x in skies.skies(8) if x[0] in day]
+    pictures = skies.main(tmp_path, wanted, QUICK)
     assert {x.stem for x in tmp_path.iterdir()} == {*pictures, "skies"}
     luminance = {name: np.asarray(xyz)[..., 1] for name, xyz in pictures.items()}
     assert all(np.all(np.isfinite(x) & (x >= 0.0)) for x in luminance.values())

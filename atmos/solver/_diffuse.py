@@ -22,9 +22,9 @@ from ._suns import AbstractSuns, zenith_angle
 class Field(eqx.Module):
     """The moments of diffuse light over altitude, from the ground up, and suns.
 
-    Of a light of irradiance 1; `moments` as of `_ordinates.Diffuse`. `mixture` are the
-    media without their forward peaks, which the light does not notice. With `stokes` 3
-    it is I, Q and U that one sees.
+    Of a light of irradiance 1, relative to the exponential of `reference`; `moments` as
+    of `_ordinates.Diffuse`. `mixture` are the media without their forward peaks, which
+    the light does not notice. With `stokes` 3 it is I, Q and U that one sees.
     """
 
     mixture: Mixture

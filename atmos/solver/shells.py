@@ -37,9 +37,9 @@ class Shells(AbstractSolver):
     """All orders of scattering in a round world, by day, in twilight and from space.
 
     Light is carried along straight lines from one of `layers` shells of air to the
-    next, a line for each shell that it does not pass and `grounded` lines that meet the
-    ground, in `azimuths` azimuths from the sun's; where the planet's shadow begins and
-    ends is exact. What scatters is kept by shell, in spherical harmonics of degrees
+    next, a line that turns round within each and `grounded` lines that meet the ground,
+    in `azimuths` azimuths from the sun's; where the planet's shadow begins and ends is
+    exact. What scatters is kept by shell, in spherical harmonics of degrees
     below `degrees`, for `suns` zenith angles of the sun, relative to how bright it is
     there: it serves every sun and every place. Orders are added up by solving for their
     sum, until it is right to `tolerance`; a solution that is not after `orders` steps
