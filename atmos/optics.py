@@ -98,7 +98,7 @@ class Layers(eqx.Module):
     column: Float[Array, "layer medium"]
 
 
-def _above(scene: Scene, altitude: Length) -> Float[Array, "medium"]:
+def above(scene: Scene, altitude: Length) -> Float[Array, "medium"]:
     """How much there is of each medium straight above the origin."""
     position = jnp.zeros(3, altitude.dtype).at[2].set(altitude)
     return densities(scene, scene.geometry.locate(position))
@@ -130,7 +130,7 @@ def _columns(
 ) -> Float[Array, "*n medium"]:
     u, w = (jnp.asarray(x, low.dtype) for x in gauss_legendre(nodes))
     inside = low[..., None] + jnp.multiply.outer(thickness, u)
-    found = jax.vmap(lambda x: _above(scene, x))(inside.ravel())
+    found = jax.vmap(lambda x: above(scene, x))(inside.ravel())
     found = found.reshape(*inside.shape, -1)
     return jnp.sum(found * jnp.multiply.outer(thickness, w)[..., None], -2)
 

@@ -17,6 +17,7 @@ from ._harmonics import harmonics, pairs
 from ._polarised import scattered
 from ._sight import cut
 from ._suns import AbstractSuns, zenith_angle
+from .single_scattering import SingleScattering
 
 
 class Field(eqx.Module):
@@ -132,6 +133,28 @@ class Field(eqx.Module):
         radiance, *rest = (jnp.sum(x, 0) for x in seen)
         total = [radiance + jnp.where(grounded, ground, 0.0), *rest]
         return jnp.stack(total) * light.irradiance.evaluate(wavelength)[None]
+
+
+def see_all(
+    field: Field,
+    single: SingleScattering,
+    scene: Scene,
+    light: Sun,
+    wavelength: Wavelength,
+    position: Position,
+    direction: Direction,
+    *,
+    pieces: int,
+    nodes: int,
+) -> Float[Array, "part wl"]:
+    """Radiance by a field, and light that turned once in the round, with its peak.
+
+    Nakajima and Tanaka 1988: the latter is dimmed as if the peak were not scattered.
+    """
+    look = light, wavelength, position, direction
+    once = single.march(scene, field.mixture.extinction, *look)
+    more = field.gather(scene, *look, pieces=pieces, nodes=nodes)
+    return once.at[-1:].add(more)
 
 
 def _between(

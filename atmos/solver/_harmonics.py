@@ -29,9 +29,10 @@ import functools as ft
 import math
 from typing import Any
 
+import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array
+from jaxtyping import Array, Float
 
 
 @ft.cache
@@ -62,6 +63,24 @@ def harmonics(cosine: Array | np.ndarray, count: int) -> Any:
         row, before = ahead * x * row - back * before + edge * row_of(m == l + 1), row
         rows.append(row)
     return xp.stack(rows, -2)
+
+
+def legendre(versine: Float[Array, "*n"], count: int) -> Float[Array, "l *n"]:
+    """What moments weigh in a phase function: Legendre polynomials, (2l + 1) / (4 pi).
+
+    Of a cosine that is told by one minus it.
+    """
+
+    def following(state, l):
+        # By its distance from the last one, exact where the versine is small.
+        known, step = state
+        step = (l * step - (2.0 * l + 1.0) * versine * known) / (l + 1.0)
+        return (known + step, step), (2.0 * l + 1.0) * known
+
+    start = jnp.ones_like(versine), jnp.zeros_like(versine)
+    degrees = jnp.arange(count, dtype=versine.dtype)
+    _, found = jax.lax.scan(following, start, degrees)
+    return found / (4.0 * math.pi)
 
 
 def spin_harmonics(cosine: Array | np.ndarray, count: int) -> tuple[Any, Any]:

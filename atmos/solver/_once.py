@@ -1,17 +1,16 @@
 """Light of the sun that turns once on its way from level to level."""
 
-import math
-
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int
 
 from ..geometry import Point
-from ..optics import Mixture
+from ..optics import above, Mixture
 from ..scene import Scene
 from ..transport import contract, gauss_legendre
-from ._rays import above, Rays, Steps
+from ._harmonics import legendre
+from ._rays import Rays, Steps
 from ._sunlight import Sunlight
 
 
@@ -83,20 +82,11 @@ class Once(eqx.Module):
         )
         lost = lambda x: contract("kasm,ml->kasl", x, self.mixture.extinction)
         arrives = [jnp.exp(-lost(past[..., n, :])) for n in range(_NODES)]
-        basis = _legendre(turn, self.mixture.scattering.shape[1])
+        basis = legendre(1.0 - turn, self.mixture.scattering.shape[1])
         total = jnp.zeros_like(arrives[0])
         for m, scattering in enumerate(self.mixture.scattering):
             seen = jnp.zeros_like(total)
             for n, arrived in enumerate(arrives):
                 seen += (share[..., n] * density[..., n, m])[..., None] * arrived
-            total += contract("kasj,jw->kasw", basis, scattering) * seen
+            total += contract("jkas,jw->kasw", basis, scattering) * seen
         return total
-
-
-def _legendre(cosine: Float[Array, "*n"], count: int) -> Float[Array, "*n l"]:
-    """What moments weigh in a phase function at the cosine of a turn."""
-    rows = [jnp.ones_like(cosine), cosine]
-    for l in range(2, count):
-        rows.append(((2 * l - 1) * cosine * rows[-1] - (l - 1) * rows[-2]) / l)
-    rows = [x * ((2 * l + 1) / (4.0 * math.pi)) for l, x in enumerate(rows[:count])]
-    return jnp.stack(rows, -1)

@@ -33,6 +33,7 @@ from ..transport import (
     enter,
     gauss_legendre,
 )
+from ._harmonics import legendre
 from ._sight import cut
 
 
@@ -158,7 +159,7 @@ class Peaks(eqx.Module):
             mixed = mixed + x[:, None] * row[None]
             before, row = row, 2.0 * ratio * row - before
 
-        lobe = _legendre(versine, fine.shape[1])
+        lobe = legendre(versine, fine.shape[1])
         source = broad * once[:, None] + peak * ratio[None] * mixed
         return contract("k,mkl->l", lobe, source)
 
@@ -169,18 +170,3 @@ def _orders(x: Array, depth: Array) -> Array:
     some = jnp.where(size > 0.0, size, 1.0)
     share = jnp.where(size > 0.0, -jnp.expm1(-some) / some, 1.0)
     return jnp.exp(jnp.maximum(x, 0.0) - depth) * share - jnp.exp(-depth)
-
-
-def _legendre(versine: Versine, count: int) -> Float[Array, "l"]:
-    """Legendre polynomials of a cosine, times (2l + 1) / (4 pi)."""
-
-    def following(state, l):
-        # By its distance from the last one, exact where the versine is small.
-        known, step = state
-        step = (l * step - (2.0 * l + 1.0) * versine * known) / (l + 1.0)
-        return (known + step, step), (2.0 * l + 1.0) * known
-
-    start = jnp.ones_like(versine), jnp.zeros_like(versine)
-    degrees = jnp.arange(count, dtype=versine.dtype)
-    _, found = jax.lax.scan(following, start, degrees)
-    return found / (4.0 * math.pi)

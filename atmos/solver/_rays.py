@@ -7,10 +7,10 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..geometry import Spherical
-from ..optics import Layers
+from ..optics import above, Layers
 from ..quantity import Length
 from ..scene import Scene
-from ..transport import contract, densities, gauss_legendre
+from ..transport import contract, gauss_legendre
 
 
 class Steps(eqx.Module):
@@ -112,12 +112,6 @@ def radius_of(scene: Scene) -> Length:
     geometry = scene.geometry
     assert isinstance(geometry, Spherical)
     return geometry.radius
-
-
-def above(scene: Scene, altitude: Length) -> Float[Array, "medium"]:
-    """How much there is of each medium straight above the origin."""
-    position = jnp.zeros(3, altitude.dtype).at[2].set(altitude)
-    return densities(scene, scene.geometry.locate(position))
 
 
 # Polynomials that sums over lines integrate exactly have a lower degree.

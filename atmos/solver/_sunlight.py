@@ -6,10 +6,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from ..optics import above
 from ..quantity import Length
 from ..scene import Scene
 from ..transport import gauss_legendre
-from ._rays import above, radius_of
+from ._rays import radius_of
 
 
 # Places on each line that meets the ground, or on half of one that does not; lines.

@@ -13,7 +13,7 @@ from ..quantity import Direction, Number, Position, Wavelength
 from ..scene import Scene
 from ..transport import columns, contract
 from ._base import AbstractSolver
-from ._diffuse import Field
+from ._diffuse import Field, see_all
 from ._second import turns
 from ._suns import EverySun
 from .single_scattering import SingleScattering
@@ -110,10 +110,8 @@ class Shared(AbstractSolver):
         direction: Direction,
     ) -> Float[Array, "part wl"]:
         look = scene, light, wavelength, position, direction
-        extinction = prepared.mixture.extinction
-        once = self.single.march(scene, extinction, *look[1:])
-        more = prepared.gather(*look, pieces=self.pieces, nodes=self.nodes)
-        return once.at[-1:].add(more)
+        fine = {"pieces": self.pieces, "nodes": self.nodes}
+        return see_all(prepared, self.single, *look, **fine)
 
 
 def _without_peaks(scene: Scene, wavelength: Wavelength) -> Mixture:

@@ -15,7 +15,7 @@ from ..quantity import Direction, Number, Position, Wavelength
 from ..scene import Scene
 from ..transport import contract
 from ._base import AbstractSolver
-from ._diffuse import Field
+from ._diffuse import Field, see_all
 from ._krylov import fixed_point
 from ._once import Once
 from ._rays import rays
@@ -154,10 +154,8 @@ class Shells(AbstractSolver):
         direction: Direction,
     ) -> Float[Array, "part wl"]:
         look = scene, light, wavelength, position, direction
-        extinction = prepared.field.mixture.extinction
-        once = self.single.march(scene, extinction, *look[1:])
-        more = prepared.field.gather(*look, pieces=self.pieces, nodes=self.nodes)
-        return once.at[-1:].add(more)
+        fine = {"pieces": self.pieces, "nodes": self.nodes}
+        return see_all(prepared.field, self.single, *look, **fine)
 
 
 # What the logarithm of brightness at most loses from one sun to the next, and while the
