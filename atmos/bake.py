@@ -2,10 +2,10 @@
 
 The file is a NumPy archive (.npz) without pickled objects, which any NumPy reads. It
 holds the arrays of `SolvedSky.prepared`, each named by the way to it, such as
-`prepared.moments`; and `header`, the bytes of a JSON text in UTF-8:
+`prepared.field.moments`; and `header`, the bytes of a JSON text in UTF-8:
 
     format   "atmos bake"
-    version  that of this layout, 1
+    version  that of this layout, 2
     atmos    the version of atmos that made it
     made     what it was made of, by the way to it: `solver.streams`, `wavelength`,
              `scene.media[0].profile.scale_height`. Arrays with type, shape and numbers;
@@ -41,7 +41,7 @@ from .scene import Scene
 from .solver import AbstractSolver, admit, SolvedSky
 
 
-VERSION = 1
+VERSION = 2
 _SHORT = 64
 _DIGITS = 64  # of a SHA-256 in hexadecimal
 

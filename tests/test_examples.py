@@ -6,8 +6,8 @@ import pathlib
 import jax.numpy as jnp
 import numpy as np
 
-from atmos import colour, render, solve
-from atmos.solver import QUICK
+from atmos import colour, polarisation, render, solve
+from atmos.solver import QUICK, SingleScattering
 from atmos.transport import direct_irradiance
 
 
@@ -39,6 +39,14 @@ def test_skies(tmp_path):
     due = radiance @ colour.response(nm)[:, 1]
     seen = luminance["noon"][-1]
     assert np.allclose(seen, due, rtol=2e-3), "the ground below reflects the sun"
+
+
+def test_polarisation(tmp_path):
+    found = load("polarisation").main(tmp_path, 9, SingleScattering(stokes=3))
+    assert (tmp_path / "polarisation.png").exists()
+    degree = np.asarray(polarisation.degree(found[-1]))
+    assert degree[4, 4] > 0.7, "straight up, across the light of a low sun"
+    assert degree[4, 4] > 2.0 * max(degree[0, 4], degree[8, 4])
 
 
 def test_volumes():

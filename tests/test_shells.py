@@ -1,5 +1,6 @@
 """Light of all orders in a round world: its laws, and against discrete ordinates."""
 
+import dataclasses
 import math
 
 import equinox as eqx
@@ -16,7 +17,6 @@ from atmos.phase import HenyeyGreenstein, Rayleigh
 from atmos.scene import Scene
 from atmos.solver import Columns, Shells, SingleScattering, solve
 from atmos.solver._krylov import fixed_point
-from atmos.solver.shells import Solution
 
 
 NM = np.array([500.0])
@@ -137,11 +137,36 @@ def test_a_huge_planet_is_flat():
     np.testing.assert_allclose(found, due, rtol=2e-3)
 
 
+@eqx.filter_jit
+def see_polarised(sky, zenith, views):
+    """From the ground and from the top: [place, view, 3]."""
+    lit = eqx.tree_at(lambda x: x.scene.lights, sky, (sun(zenith),))
+    at = jnp.array([[0.0, 0.0, 0.0], [0.0, 0.0, TOP]])
+    return jax.vmap(jax.vmap(lit.stokes, (None, 0)), (0, None))(at, views)[..., 0]
+
+
+def test_polarised_light_on_a_huge_planet_is_as_published():
+    """Natraj, Li and Yung 2009, ApJ 691, 1909: depth 0.5, a ground that returns 0.25."""
+    scene = numbers(depth=0.5, haze=0.0, ground=0.25, radius=1e3 * RADIUS)
+    air = dataclasses.replace(scene.media[0], phase=Rayleigh(0.0))
+    scene = dataclasses.replace(scene, media=(air,))
+    sky = solve(scene, dataclasses.replace(SHELLS, stokes=3), NM)
+    level, turn = math.sqrt(1.0 - 0.64**2), math.pi / 2.0
+    view = np.array([level * math.sin(turn), level * math.cos(turn), 0.64])
+    views = np.stack([view, view * [1, 1, -1]])
+    seen = math.pi * see_polarised(sky, math.acos(0.2), views)  # there it shines by pi
+    for found, due in [
+        (seen[1, 1], (0.10085308, -0.06076128, 0.01855839)),
+        (seen[0, 0], (0.07578342, -0.04878055, 0.01479565)),
+    ]:
+        np.testing.assert_allclose(found / due[0], np.array(due) / due[0], atol=5e-3)
+
+
 def test_what_is_not_absorbed_leaves():
     """White air over white ground: all light that meets either flies out at the top."""
     field = solve(numbers(depth=0.5, haze=0.0, ground=1.0), SHELLS, NM).prepared.field
     zenith = np.asarray(field.suns.zeniths())
-    up = np.asarray(field.up)[:, -1, 0] * np.exp(np.asarray(field.reference)[:, -1])
+    up = np.asarray(field.up)[-1, :, 0] * np.exp(np.asarray(field.reference)[-1])
     leaves = 2.0 * CubicSpline(zenith, up * np.sin(zenith)).integrate(0.0, math.pi)
     # Of parallel light, what passes by the planet at a distance and is dimmed.
     above = np.linspace(0.0, TOP, 2001)
@@ -189,11 +214,11 @@ def test_what_is_not_round_or_not_layered_is_refused():
 
 
 def test_what_is_not_solved_to_the_tolerance_is_refused():
-    field = solve(numbers(), SHELLS, NM).prepared.field
+    prepared = solve(numbers(), SHELLS, NM).prepared
     with pytest.raises(
         ValueError, match="within 200 `orders`; what is missing is 0.02"
     ):
-        SHELLS.found(Solution(field, jnp.array(0.02)))
+        SHELLS.found(dataclasses.replace(prepared, error=jnp.array(0.02)))
     never = lambda x: -2.0 * x
     _, error = fixed_point(never, jnp.ones((3, 1)), 1e-9, 0)
     assert error == 1.0

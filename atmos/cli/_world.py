@@ -126,11 +126,12 @@ def solver_named(
     single = QUICK if quick else SingleScattering()
     if name == "columns":
         return Columns(single=single, stokes=stokes)
-    more = {"shared": Shared, "shells": Shells}
-    if name in more:
+    if name == "shells":
+        return Shells(single=single, stokes=stokes)
+    if name == "shared":
         if stokes != 1:
-            refuse("--stokes", f"must be 1 with --solver {name}", stokes)
-        return more[name](single=single)
+            refuse("--stokes", "must be 1 with --solver shared", stokes)
+        return Shared(single=single)
     if name == "march":
         if stokes != 1:
             refuse("--stokes", "must be 1 with --solver march", stokes)

@@ -4,6 +4,7 @@ from ._base import (
     solve as solve,
     SolvedSky as SolvedSky,
 )
+from ._diffuse import Fluxes as Fluxes
 from ._shadows import (
     AbstractShadows as AbstractShadows,
     ShadowCache as ShadowCache,
@@ -21,7 +22,7 @@ from ._tally import (
     estimate as estimate,
     Tally as Tally,
 )
-from .columns import Columns as Columns, Fluxes as Fluxes
+from .columns import Columns as Columns
 from .path_tracing import PathTracing as PathTracing
 from .ray_marching import RayMarching as RayMarching
 from .shared import Shared as Shared

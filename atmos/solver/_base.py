@@ -1,4 +1,5 @@
 import abc
+import dataclasses
 import math
 from typing import Any, ClassVar
 
@@ -85,6 +86,25 @@ class AbstractSolver(eqx.Module):
         medium's phase function towards the light, and then radiance as it stands, or
         I, Q and U as they stand.
         """
+
+    def scattered_from(
+        self,
+        prepared: PyTree[Any],
+        scene: Scene,
+        light: Sun,
+        towards: Float[Array, "light 3"],
+        wavelength: Wavelength,
+        position: Position,
+        direction: Direction,
+    ) -> Float[Array, "light part wl"]:
+        """The same for a light that stands in one of several directions instead."""
+
+        def of(towards):
+            stands = dataclasses.replace(light, direction=towards)
+            look = scene, stands, wavelength, position, direction
+            return self.scattered(prepared, *look)
+
+        return jax.vmap(of)(towards)
 
     def emitted(
         self,
@@ -208,29 +228,35 @@ def _known(x: Number) -> float:
 
 # So far from straight up, in rad, single precision still knows the azimuth.
 _SLIVER = 1e-6
-# Directions that are looked at together: grids of all sizes share a compilation. On a
-# CPU as many as fit into its cache.
-_TOGETHER, _TOGETHER_ON_CPU = 720, 144
+# How many azimuths, at most, and rings are looked at together: grids of all sizes share
+# a compilation. On a CPU rings go one after the other, which fit into its cache.
+_AROUND = 17
+_RINGS, _RINGS_ON_CPU = 80, 8
 
 
 def _tabulate(sky: SolvedSky, position: Position, resolution: Resolution) -> Panorama:
     """The sky on a grid of directions, one light after the other."""
     grid, phases, sides, zenith, azimuth = _frame(sky, position, resolution)
-    size = resolution.above + resolution.below, resolution.around
+    rings, around = resolution.above + resolution.below, resolution.around
 
     def table(light):
-        look = lambda x: _looks(sky, light, position, *x)
+        look = lambda x, y: _looks(sky, light, position, x, y)
         if any(isinstance(x, Tracer) for x in jax.tree.leaves((sky, position))):
             # A gradient would else keep every place on every ray.
-            found = jax.lax.map(jax.checkpoint(look), (zenith, azimuth))
+            block = jax.checkpoint(look)
+            along = lambda y: jax.lax.map(lambda x: block(x, y), zenith)
+            found = jax.lax.map(along, azimuth)
         else:
-            found = jnp.stack([look(x) for x in zip(zenith, azimuth, strict=True)])
-        found = found.reshape(-1, *found.shape[2:])[: math.prod(size)]
-        return found.reshape(*size, *found.shape[1:])
+            found = jnp.stack(
+                [jnp.stack([look(x, y) for x in zenith]) for y in azimuth]
+            )
+        found = jnp.moveaxis(found, 0, 2)
+        found = found.reshape(zenith.size, azimuth.size, *found.shape[4:])
+        return found[:rings, :around]
 
     tables = [table(x) for x in sky.scene.lights]
     parts = len(phases) + sky.solver.stokes
-    none = jnp.zeros((0, *size, parts, sky.wavelength.size), zenith.dtype)
+    none = jnp.zeros((0, rings, around, parts, sky.wavelength.size), zenith.dtype)
     return Panorama(
         grid=grid,
         table=jnp.stack(tables) if tables else none,
@@ -248,12 +274,13 @@ def _frame(
     """The grid, the phase functions to put on, where the lights stand; directions."""
     dip, first = sky._edges(position[2])
     grid = Grid(first, 0.5 * math.pi + dip, resolution)
-    angles = jnp.meshgrid(grid.zeniths(), grid.azimuths(), indexing="ij")
-    together = _TOGETHER_ON_CPU if jax.default_backend() == "cpu" else _TOGETHER
-    missing = -angles[0].size % together
+    on_cpu = jax.default_backend() == "cpu"
     blocks = [
-        jnp.pad(x.ravel(), (0, missing), mode="edge").reshape(-1, together)
-        for x in angles
+        jnp.pad(x, (0, -x.size % size), mode="edge").reshape(-1, size)
+        for x, size in (
+            (grid.zeniths(), _RINGS_ON_CPU if on_cpu else _RINGS),
+            (grid.azimuths(), min(resolution.around, _AROUND)),
+        )
     ]
     terms = [x.phase.terms(sky.wavelength) for x in sky.scene.scattering_media]
     phases = [x for mixture in terms for x, _ in mixture]
@@ -268,34 +295,46 @@ def _looks(
     sky: SolvedSky,
     light: Sun,
     position: Position,
-    zenith: Float[Array, "ray"],
-    azimuth: Float[Array, "ray"],
-) -> Float[Array, "ray part wl"]:
+    zenith: Float[Array, "ring"],
+    azimuth: Float[Array, "around"],
+) -> Float[Array, "ring around part wl"]:
     """What one sees by one light, in azimuths relative to it, for a panorama's table.
 
-    Parts whose phase function is isotropic, or partly so, join what has none.
+    Parts whose phase function is isotropic, or partly so, join what has none. It is the
+    light that goes around, so that a ring is one line of sight.
     """
     terms = [x.phase.terms(sky.wavelength) for x in sky.scene.scattering_media]
     east, north = light.horizontal
+    ahead, aside = jnp.cos(azimuth), jnp.sin(azimuth)
+    level = east * light.direction[0] + north * light.direction[1]
+    across = (
+        level * (east * ahead - north * aside),
+        level * (north * ahead + east * aside),
+    )
+    height = jnp.broadcast_to(light.direction[2], azimuth.shape)
+    towards = jnp.stack([*across, height], -1)
 
-    def look(zenith, azimuth):
-        ahead, aside = jnp.cos(azimuth), jnp.sin(azimuth)
-        level = [east * ahead + north * aside, north * ahead - east * aside]
+    def ring(zenith):
         up, flat = jnp.cos(zenith), jnp.sin(zenith)
         if sky.solver.stokes == 3:  # straight up too it is level in this azimuth
             flat = jnp.maximum(flat, _SLIVER)
-        direction = jnp.stack([flat * level[0], flat * level[1], up])
-        found = sky._parts(light, position, direction)
-        parts, rest = [], found[len(terms) :]
-        for part, mixture in zip(found, terms, strict=False):
+        direction = jnp.stack([flat * east, flat * north, up])
+        look = sky.wavelength, position, direction
+        found = sky.solver.scattered_from(
+            sky.prepared, sky.scene, light, towards, *look
+        )
+        parts, rest = [], found[:, len(terms) :]
+        for part, mixture in zip(jnp.moveaxis(found, 1, 0), terms, strict=False):
             for phase, weight in mixture:
                 if isinstance(phase, Isotropic):
-                    rest = rest.at[0].add(weight * part * (0.25 / math.pi))
+                    rest = rest.at[:, 0].add(weight[None] * part * (0.25 / math.pi))
                 else:
-                    parts.append(weight * part)
-        return jnp.stack([*parts, *rest])
+                    parts.append(weight[None] * part)
+        return jnp.concatenate([*(x[:, None] for x in parts), rest], 1)
 
-    return jax.vmap(look)(zenith, azimuth)
+    if jax.default_backend() == "cpu":
+        return jax.lax.map(ring, zenith)
+    return jax.vmap(ring)(zenith)
 
 
 def solve(scene: Scene, solver: AbstractSolver, wavelength: ArrayLike) -> SolvedSky:

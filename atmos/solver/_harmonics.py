@@ -83,6 +83,22 @@ def legendre(versine: Float[Array, "*n"], count: int) -> Float[Array, "l *n"]:
     return found / (4.0 * math.pi)
 
 
+def second_order(versine: Float[Array, "*n"], count: int) -> Float[Array, "l *n"]:
+    """What moments weigh in polarisation: `harmonics` of order 2, (2l + 1) / (4 pi).
+
+    Of a cosine that is told by one minus it.
+    """
+    cosine, none = 1.0 - versine, jnp.zeros_like(versine)
+    known, before = math.sqrt(0.375) * versine * (2.0 - versine), none
+    rows = [none, none]
+    for l in range(2, count):
+        rows.append((2.0 * l + 1.0) / (4.0 * math.pi) * known)
+        ahead, back = (math.sqrt(x * x - 4.0) for x in (l + 1.0, l))
+        step = ((2.0 * l + 1.0) * cosine * known - back * before) / ahead
+        known, before = step, known
+    return jnp.stack(rows)[:count]
+
+
 def spin_harmonics(cosine: Array | np.ndarray, count: int) -> tuple[Any, Any]:
     """R and S: half the sum and half the difference of d^l_(2,m) and d^l_(-2,m).
 
@@ -92,6 +108,9 @@ def spin_harmonics(cosine: Array | np.ndarray, count: int) -> tuple[Any, Any]:
     """
     xp = np if isinstance(cosine, np.ndarray) else jnp
     x = cosine[..., None]
+    if not count:
+        none = xp.zeros((*cosine.shape, 0, 0), cosine.dtype)
+        return none, none
     sine = _sine(xp, x)
     both = [_spin(xp, x, sine, n, count) for n in (2, -2)]
     return 0.5 * (both[0] + both[1]), 0.5 * (both[0] - both[1])

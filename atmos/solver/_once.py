@@ -7,9 +7,10 @@ from jaxtyping import Array, Float, Int
 
 from ..geometry import Point
 from ..optics import above, Mixture
+from ..polarisation import vibration
 from ..scene import Scene
 from ..transport import contract, gauss_legendre
-from ._harmonics import legendre
+from ._harmonics import legendre, second_order
 from ._rays import Rays, Steps
 from ._sunlight import Sunlight
 
@@ -27,6 +28,7 @@ class Once(eqx.Module):
     sunlight: Sunlight
     zenith: Float[Array, "sun"]
     azimuth: Float[Array, "azimuth"]
+    stokes: int = eqx.field(static=True)
 
     def ground(self) -> Float[Array, "sun wl"]:
         """What of it reaches the ground without a turn, on a square metre."""
@@ -37,11 +39,15 @@ class Once(eqx.Module):
         direct = jnp.exp(-contract("sm,ml->sl", column, self.mixture.extinction))
         return jnp.where(up, rise, 0.0)[:, None] * direct
 
-    def rising(self, layer: Int[Array, ""]) -> Float[Array, "ray azimuth sun wl"]:
+    def rising(
+        self, layer: Int[Array, ""]
+    ) -> Float[Array, "stokes ray azimuth sun wl"]:
         """In views upwards from the lower level of a layer."""
         return self._turned(layer, layer, self.rays.up, 1.0)
 
-    def falling(self, layer: Int[Array, ""]) -> Float[Array, "ray azimuth sun wl"]:
+    def falling(
+        self, layer: Int[Array, ""]
+    ) -> Float[Array, "stokes ray azimuth sun wl"]:
         """In views downwards from the upper level of a layer."""
         return self._turned(layer + 1, layer, self.rays.down, -1.0)
 
@@ -55,7 +61,8 @@ class Once(eqx.Module):
 
         def one(cosine, ahead, length, azimuth, zenith):
             flat = jnp.sqrt(jnp.maximum(1.0 - cosine * cosine, 0.0))
-            level = flat * jnp.cos(azimuth), flat * jnp.sin(azimuth)
+            # Clockwise from the sun, as of `_harmonics`.
+            level = flat * jnp.cos(azimuth), -flat * jnp.sin(azimuth)
             view = jnp.stack([*level, sign * cosine])
             zero, rises = jnp.zeros_like(zenith), jnp.cos(zenith)
             sun = jnp.stack([jnp.sin(zenith), zero, rises])
@@ -71,22 +78,29 @@ class Once(eqx.Module):
             past = self.sunlight.columns(height, radius * rises + along * turn)
             density = jax.vmap(lambda x: above(self.scene, x))(height)
             past += (0.5 * along)[:, None] * (density + here[None])
-            return lit * w, density, past, turn
+            return lit * w, density, past, turn, jnp.stack(vibration(up, view, sun))
 
         over = jax.vmap(one, (None, None, None, None, 0))
         over = jax.vmap(over, (None, None, None, 0, None))
         over = jax.vmap(over, (0, 0, 0, None, None))
         cosine, ahead = self.rays.cosine[level], self.rays.ahead[level]
-        share, density, past, turn = over(
+        share, density, past, turn, vibrates = over(
             cosine, ahead, steps.length[layer], self.azimuth, self.zenith
         )
         lost = lambda x: contract("kasm,ml->kasl", x, self.mixture.extinction)
         arrives = [jnp.exp(-lost(past[..., n, :])) for n in range(_NODES)]
-        basis = legendre(1.0 - turn, self.mixture.scattering.shape[1])
-        total = jnp.zeros_like(arrives[0])
+        _, k, *_ = self.mixture.polarised.shape
+        broad = legendre(1.0 - turn, self.mixture.scattering.shape[1])
+        across = second_order(1.0 - turn, k)
+        total = [jnp.zeros_like(arrives[0])] * (1 if self.stokes == 1 else 2)
         for m, scattering in enumerate(self.mixture.scattering):
-            seen = jnp.zeros_like(total)
+            seen = jnp.zeros_like(arrives[0])
             for n, arrived in enumerate(arrives):
                 seen += (share[..., n] * density[..., n, m])[..., None] * arrived
-            total += contract("jkas,jw->kasw", basis, scattering) * seen
-        return total
+            lobes = [(broad, scattering), (across, self.mixture.polarised[m, :, 2])]
+            for i, (basis, lobe) in enumerate(lobes[: len(total)]):
+                total[i] += contract("jkas,jw->kasw", basis, lobe) * seen
+        if self.stokes == 1:
+            return total[0][None]
+        q, u = vibrates[..., 0, None], vibrates[..., 1, None]
+        return jnp.stack([total[0], q * total[1], u * total[1]])

@@ -23,18 +23,17 @@ from jaxtyping import Array, Float
 
 from ..light import Sun
 from ..optics import Mixture, mixture
-from ..quantity import Direction, Position, Radiance, Versine, versine, Wavelength
+from ..quantity import Radiance, Versine, versine, Wavelength
 from ..scene import Scene
 from ..transport import (
     columns,
     contract,
     cumulative,
     densities,
-    enter,
     gauss_legendre,
 )
 from ._harmonics import legendre
-from ._sight import cut
+from ._sight import Sight
 
 
 # Degrees of the moments of peaks: what is yet narrower turns light once at most.
@@ -74,17 +73,13 @@ class Peaks(eqx.Module):
         scene: Scene,
         light: Sun,
         wavelength: Wavelength,
-        position: Position,
-        direction: Direction,
-        *,
-        pieces: int,
+        sight: Sight,
     ) -> Radiance:
         """What light that turned in peaks adds to that which turned once."""
-        path, far, grounded = enter(scene, position, direction)
+        path, far, length = sight.path, sight.far, sight.length
         gone, met = self.without.extinction, self.within.extinction
-        begin, length = cut(scene, path, far, gone, pieces)
         u, w = (jnp.asarray(x, far.dtype) for x in gauss_legendre(_NODES))
-        places = begin[:, None] + length[:, None] * u[None]
+        places = sight.begin[:, None] + length[:, None] * u[None]
         begins, ends = path.shadow(light.direction, jnp.zeros_like(far))
         lit = (places <= begins) | (places >= ends)
 
@@ -114,7 +109,7 @@ class Peaks(eqx.Module):
             passed,
             jnp.exp(-depth(passed, gone)),
             depth(passed, met),
-            versine(direction, light.direction),
+            versine(path.direction, light.direction),
         )
 
         passed = jnp.sum(whole, 0) + sunwards[-1]
@@ -122,7 +117,7 @@ class Peaks(eqx.Module):
         ground = (
             scene.ground.evaluate(wavelength) / math.pi * jnp.maximum(rise[-1], 0.0)
         )
-        shown = grounded & ~((begins < far) & (far < ends))
+        shown = sight.grounded & ~((begins < far) & (far < ends))
         total = turned + jnp.where(shown, ground * more, 0.0)
         return total * light.irradiance.evaluate(wavelength)
 

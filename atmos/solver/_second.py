@@ -13,7 +13,7 @@ from ..optics import Mixture
 from ..quantity import Depth
 from ..scene import Scene
 from ..transport import contract, densities, gauss_legendre
-from ._sight import cut
+from ._sight import sight
 from ._slants import horizons, slants
 
 
@@ -70,22 +70,22 @@ def turns(
         start = scene.geometry.locate(jnp.zeros(3, altitude.dtype).at[2].set(altitude))
         level = jnp.sqrt(jnp.maximum(1.0 - cosine * cosine, 0.0))
         direction = jnp.stack([level, jnp.zeros_like(level), cosine])
-        path = scene.geometry.path(start, direction)
-        span = path.span(scene.top)
-        begin, length = cut(scene, path, span.far, mixture.extinction, _PIECES)
+        extinction = mixture.extinction
+        line = sight(scene, start.position, direction, extinction, _PIECES)
+        path, begin, length = line.path, line.begin, line.length
         turned, passed = _steps(scene, mixture, path, begin, length)
 
-        places = jnp.concatenate([begin + 0.5 * length, span.far[None]])
+        places = jnp.concatenate([begin + 0.5 * length, line.far[None]])
         points = jax.vmap(path.at)(places)
         rises = contract("pc,sac->psa", points.up, suns)
         depth = jax.vmap(towards.depths, (0, 0, None))(
-            points.altitude, rises, mixture.extinction
+            points.altitude, rises, extinction
         )
         left = jnp.exp(-depth)
         dark = jax.vmap(jax.vmap(lambda x: path.shadow(x, jnp.zeros_like(cosine))))
         lit = _lit(begin, length, dark(suns))
         once = contract("psa,psal,pl->sl", lit, left[:-1], turned)
-        ground = jnp.where(span.grounded, jnp.exp(-passed), 0.0)
+        ground = jnp.where(line.grounded, jnp.exp(-passed), 0.0)
         bounced = contract("sa,sal->sl", jnp.maximum(rises[-1], 0.0), left[-1])
         once = 0.25 * once + (albedo * ground)[None] * bounced
         return once / (math.pi * _TURNS), jnp.sum(turned, 0), ground

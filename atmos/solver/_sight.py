@@ -1,33 +1,44 @@
 """Where to cut a line of sight so that each piece is smooth, and matters."""
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax.lax import stop_gradient
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from ..geometry import AbstractPath
-from ..quantity import Length
+from ..quantity import Direction, Length, Position
 from ..scene import Scene
-from ..transport import contract, densities, gauss_legendre
+from ..transport import contract, densities, enter, gauss_legendre
 
 
 # Where to cut a ray: fractions of its length in which depth is summed up coarsely.
 _COARSE = np.concatenate([[0.0], 2.0 ** np.linspace(-20.0, 0.0, 33)])
 
 
-def cut(
+class Sight(eqx.Module):
+    """A line of sight from where it enters the air, and where its pieces begin."""
+
+    path: AbstractPath
+    far: Length
+    grounded: Bool[Array, ""]
+    begin: Float[Array, "piece"]
+    length: Float[Array, "piece"]
+
+
+def sight(
     scene: Scene,
-    path: AbstractPath,
-    far: Length,
+    position: Position,
+    direction: Direction,
     extinction: Float[Array, "medium wl"],
     pieces: int,
-) -> tuple[Float[Array, "piece"], Float[Array, "piece"]]:
-    """Where the pieces of a ray begin, and their lengths.
+) -> Sight:
+    """Cut at edges of media, and so that pieces are alike.
 
-    Cut at edges of media, and so that each holds a fair share of what one sees in the
-    thinnest and the thickest light.
+    Each holds a fair share of what one sees in the thinnest and the thickest light.
     """
+    path, far, grounded = enter(scene, position, direction)
     places = far * jnp.asarray(_COARSE, far.dtype)
     step = jnp.diff(places)
     column = jnp.zeros((len(_COARSE) - 1, len(scene.media)), far.dtype)
@@ -58,4 +69,4 @@ def cut(
         )
 
     kept = jax.lax.fori_loop(0, last - pieces, drop, index)[: pieces + 1]
-    return edges[kept[:-1]], jnp.diff(edges[kept])
+    return Sight(path, far, grounded, edges[kept[:-1]], jnp.diff(edges[kept]))

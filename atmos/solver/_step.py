@@ -1,5 +1,6 @@
 """A step of light from one shell to the next: what is left of it, and where from."""
 
+import dataclasses
 import math
 
 import equinox as eqx
@@ -46,35 +47,49 @@ class Suns(eqx.Module):
 
     def _between(
         self, azimuth: Float[Array, "ray azimuth sun"]
-    ) -> tuple[Int[Array, "ray azimuth sun 4"], Float[Array, "ray azimuth sun 4"]]:
-        """Which azimuths to mix, and how much of each."""
+    ) -> tuple[
+        Int[Array, "ray azimuth sun 4"], Float[Array, "..."], Float[Array, "..."]
+    ]:
+        """Which azimuths to mix, how much of each, and on which side."""
         count = self.azimuths
         t = azimuth * (count / math.pi) - 0.5
         first = jnp.clip(jnp.floor(jax.lax.stop_gradient(t)), -1.0, count - 1.0)
         near = jnp.arange(-1, 3, dtype=jnp.int32)
         index = first.astype(jnp.int32)[..., None] + near[None, None, None]
         # What lies beyond 0 and pi is the mirror image.
+        beyond = (index < 0) | (index >= count)
         index = jnp.where(index < 0, -1 - index, index)
         index = jnp.where(index >= count, 2 * count - 1 - index, index)
-        return jnp.clip(index, 0, count - 1), cubic(t - first + 1.0)
+        weights = cubic(t - first + 1.0)
+        side = jnp.where(beyond, -jnp.ones_like(weights), 1.0)
+        return jnp.clip(index, 0, count - 1), weights, side
 
 
 class Elsewhere(eqx.Module):
     """Light at the other ends of steps, by where the sun stands there.
 
     Places and weights in azimuths and in zenith angles of the sun, of which only the
-    first of four is told.
+    first of four is told. Where an azimuth is the mirror image of what is meant, `side`
+    is -1.
     """
 
     sun: Int[Array, "ray azimuth sun"]
     by_sun: Float[Array, "ray azimuth sun 4"]
     azimuth: Int[Array, "ray azimuth sun 4"]
     by_azimuth: Float[Array, "ray azimuth sun 4"]
+    side: Float[Array, "ray azimuth sun 4"]
 
     def take(
+        self, light: Float[Array, "stokes ray azimuth sun wl"]
+    ) -> Float[Array, "stokes ray azimuth sun wl"]:
+        """What is there of light: I, or I, Q and U, which has another sign mirrored."""
+        odd = dataclasses.replace(self, by_azimuth=self.by_azimuth * self.side)
+        parts = zip(light, (self, self, odd), strict=False)
+        return jnp.stack([there._take(x) for x, there in parts])
+
+    def _take(
         self, light: Float[Array, "ray azimuth sun wl"]
     ) -> Float[Array, "ray azimuth sun wl"]:
-        """What is there of light."""
         suns = light.shape[2]
 
         def along(light, there):
@@ -113,12 +128,13 @@ class Step(eqx.Module):
 
     def carry(
         self, light: Array, sources: tuple[Array, Array] | None
-    ) -> Float[Array, "ray azimuth sun wl"]:
+    ) -> Float[Array, "stokes ray azimuth sun wl"]:
         """Light where the steps end, with what the sources at both ends add."""
+        left = self.through[None] * light
         if sources is None:
-            return self.begin.take(self.through * light)
-        sent = self.through * light + self.far * sources[0]
-        return self.begin.take(sent) + self.near * sources[1]
+            return self.begin.take(left)
+        sent = left + self.far[None] * sources[0]
+        return self.begin.take(sent) + self.near[None] * sources[1]
 
 
 def step(

@@ -21,9 +21,9 @@ class AbstractSuns(eqx.Module):
 
     @abc.abstractmethod
     def between(
-        self, light: Sun, zenith: Angle
-    ) -> tuple[Int[Array, "k"], Float[Array, "k"]]:
-        """Which of them to mix, and how much of each, where a light stands so."""
+        self, light: Sun, zenith: Float[Array, "*n"]
+    ) -> tuple[Int[Array, "*n"], Float[Array, "*n k"]]:
+        """The first of those to mix, and how much of each, where a light stands so."""
 
 
 class FlatSuns(AbstractSuns):
@@ -35,9 +35,10 @@ class FlatSuns(AbstractSuns):
         return self.lights
 
     def between(
-        self, light: Sun, zenith: Angle
-    ) -> tuple[Int[Array, "1"], Float[Array, "1"]]:
-        return _nearest(self.lights, light)[None], jnp.ones_like(zenith)[None]
+        self, light: Sun, zenith: Float[Array, "*n"]
+    ) -> tuple[Int[Array, "*n"], Float[Array, "*n 1"]]:
+        which = jnp.broadcast_to(_nearest(self.lights, light), zenith.shape)
+        return which, jnp.ones_like(zenith)[..., None]
 
 
 class EverySun(AbstractSuns):
@@ -61,14 +62,14 @@ class EverySun(AbstractSuns):
         return jnp.clip(found, 0.0, self.last)
 
     def between(
-        self, light: Sun, zenith: Angle
-    ) -> tuple[Int[Array, "2"], Float[Array, "2"]]:
+        self, light: Sun, zenith: Float[Array, "*n"]
+    ) -> tuple[Int[Array, "*n"], Float[Array, "*n 2"]]:
         low, high = self._ends()
         t = jnp.arcsinh((jnp.minimum(zenith, self.last) - 0.5 * math.pi) / _CLOSE)
         t = jnp.clip((t - low) / (high - low), 0.0, 1.0) * (self.count - 1)
         first = jnp.clip(jnp.floor(stop_gradient(t)), 0.0, self.count - 2.0)
-        weights = jnp.stack([1.0 - (t - first), t - first])
-        return first.astype(jnp.int32) + jnp.arange(2, dtype=jnp.int32), weights
+        weights = jnp.stack([1.0 - (t - first), t - first], -1)
+        return first.astype(jnp.int32), weights
 
 
 # The distance from a light's zenith angle within which others lie evenly.
@@ -98,10 +99,10 @@ class RoundSuns(AbstractSuns):
         return jnp.clip(found, 0.0, self.last).ravel()
 
     def between(
-        self, light: Sun, zenith: Angle
-    ) -> tuple[Int[Array, "4"], Float[Array, "4"]]:
+        self, light: Sun, zenith: Float[Array, "*n"]
+    ) -> tuple[Int[Array, "*n"], Float[Array, "*n 4"]]:
         first, x = self.place(zenith, _nearest(self.lights, light))
-        return first + jnp.arange(4, dtype=jnp.int32), cubic(x)
+        return first, cubic(x)
 
     def place(
         self, zenith: Float[Array, "*n"], which: Int[Array, ""] | int = 0

@@ -10,7 +10,7 @@ from jaxtyping import Array, Float, Int
 
 from ..quantity import Fraction
 from ..transport import contract
-from ._harmonics import harmonics, pairs
+from ._harmonics import harmonics, pairs, spin_harmonics
 from ._once import Once
 from ._rays import Rays
 from ._step import step, Suns
@@ -22,7 +22,7 @@ class Light(eqx.Module):
     `moments` as of `_ordinates.Diffuse`; `up` and `down` are its fluxes.
     """
 
-    moments: Float[Array, "level pair sun wl"]
+    moments: Float[Array, "level row sun wl"]
     up: Float[Array, "level sun wl"]
     down: Float[Array, "level sun wl"]
 
@@ -31,8 +31,9 @@ class Sweep(eqx.Module):
     """All that does not change from one order of scattering to the next.
 
     `turned` is the single-scattering albedo of each layer times the moments of its
-    phase function, `up` and `down` are optical depths of steps. The logarithm of what
-    light is told relative to is `reference`.
+    phase function, `polarised` that times those of polarisation, `up` and `down` are
+    optical depths of steps. The logarithm of what light is told relative to is
+    `reference`. Light is I, or I, Q and U where `stokes` is 3.
     """
 
     rays: Rays
@@ -40,10 +41,12 @@ class Sweep(eqx.Module):
     up: Float[Array, "layer ray wl"]
     down: Float[Array, "layer ray wl"]
     turned: Float[Array, "layer l wl"]
+    polarised: Float[Array, "layer k 3 wl"]
     albedo: Fraction
     reference: Float[Array, "level sun"]
+    stokes: int = eqx.field(static=True)
 
-    def carry(self, moments: Float[Array, "level pair sun wl"]) -> Light:
+    def carry(self, moments: Float[Array, "level row sun wl"]) -> Light:
         """The light that these moments turn into, with its reflection by the ground."""
         return self._carry(moments, None)
 
@@ -61,7 +64,7 @@ class Sweep(eqx.Module):
 
     def _fall(
         self, moments: Array | None, once: Once | None
-    ) -> tuple[Light, Float[Array, "layer azimuth sun wl"]]:
+    ) -> tuple[Light, Float[Array, "layer stokes azimuth sun wl"]]:
         """What comes down; and what of it turns round in each layer, at its top."""
         rays = self.rays
         size = rays.cosine.shape[1], self.reference.shape[1]
@@ -81,13 +84,15 @@ class Sweep(eqx.Module):
             light = step(self.suns, angle, depth, begins, ends).carry(light, sources)
             if once is not None:
                 light += once.rising(i) * self._scale(i)
-            light = jnp.where(rays.cosine[i][:, None, None, None] > 0.0, light, 0.0)
-            turns = light[rays.grounded + jnp.maximum(i - 1, 0)]
+            there = rays.cosine[i][None, :, None, None, None] > 0.0
+            light = jnp.where(there, light, 0.0)
+            turns = light[:, rays.grounded + jnp.maximum(i - 1, 0)]
             return light, (*self._gathered(here, i, light), turns)
 
         each = jnp.arange(len(self.turned), dtype=jnp.int32)
         reference = self.reference[1:], self.reference[:-1]
-        steps = each, rays.up.angle, self.up, self.turned, *reference
+        turned = self.turned, self.polarised
+        steps = each, rays.up.angle, self.up, turned, *reference
         _, (found, down, kept) = jax.lax.scan(fall, self._dark(), steps, reverse=True)
         found, down, kept = (
             jnp.concatenate([x, jnp.zeros_like(x[:1])]) for x in (found, down, kept)
@@ -98,7 +103,7 @@ class Sweep(eqx.Module):
         self,
         moments: Array | None,
         once: Once | None,
-        kept: Float[Array, "layer azimuth sun wl"],
+        kept: Float[Array, "layer stokes azimuth sun wl"],
         shines: Float[Array, "sun wl"],
     ) -> Light:
         """What comes up, of light that shines from the ground and what turned round."""
@@ -111,78 +116,105 @@ class Sweep(eqx.Module):
             turns = rays.grounded + i
             which = jnp.arange(size[0], dtype=i.dtype) == turns
             # A line that turns round comes from the level where it ends.
-            swap = lambda all, one: jnp.where(
-                which.reshape(-1, *(1,) * (all.ndim - 1)), one[None], all
-            )
+            which = which[None, :, None, None, None]
+            swap = lambda all, one: jnp.where(which, one[:, None], all)
             begins, ends = (jnp.broadcast_to(y, size) for y in (begins, ends))
             ahead, here = self._basis(rays.cosine[i + 1])
             sources = None
             if moments is not None:
                 below = self._basis(rays.cosine[i])[1]
                 far = _source(below, turned, moments[i])
-                one = _source(ahead[turns][None], turned, moments[i + 1])[0]
-                sources = swap(far, one), _source(here, turned, moments[i + 1])
-            steps = step(self.suns, angle, depth, swap(begins, ends[0]), ends)
+                one = _source(ahead[:, turns][:, None], turned, moments[i + 1])
+                sources = swap(far, one[:, 0]), _source(here, turned, moments[i + 1])
+            begins = jnp.where(which[0, :, :, 0, 0], ends, begins)
+            steps = step(self.suns, angle, depth, begins, ends)
             light = steps.carry(swap(light, kept), sources)
             if once is not None:
                 light += once.falling(i) * self._scale(i + 1)
             return light, self._gathered(here, i + 1, light)
 
         each = jnp.arange(len(self.turned), dtype=jnp.int32)
-        ground = jnp.broadcast_to(shines[None, None] / math.pi, self._dark().shape)
+        ground = self._dark().at[0].set(shines[None, None] / math.pi)
         first = self._gathered(self._basis(rays.cosine[0])[1], each[0], ground)
         reference = self.reference[:-1], self.reference[1:]
-        steps = each, rays.down.angle, self.down, self.turned, kept, *reference
+        turned = self.turned, self.polarised
+        steps = each, rays.down.angle, self.down, turned, kept, *reference
         _, rest = jax.lax.scan(rise, ground, steps)
         join = lambda x, y: jnp.concatenate([x[None], y])
         found, up = jax.tree.map(join, first, rest)
         return Light(found, up, jnp.zeros_like(up))
 
-    def _dark(self) -> Float[Array, "ray azimuth sun wl"]:
+    def _dark(self) -> Float[Array, "stokes ray azimuth sun wl"]:
         rays, suns = self.rays.cosine.shape[1], self.reference.shape[1]
-        shape = rays, self.suns.azimuths, suns, self.turned.shape[-1]
+        shape = self.stokes, rays, self.suns.azimuths, suns, self.turned.shape[-1]
         return jnp.zeros(shape, self.reference.dtype)
 
-    def _scale(self, level: Int[Array, ""]) -> Float[Array, "1 1 sun 1"]:
-        return jnp.exp(-self.reference[level])[None, None, :, None]
+    def _scale(self, level: Int[Array, ""]) -> Float[Array, "1 1 1 sun 1"]:
+        return jnp.exp(-self.reference[level])[None, None, None, :, None]
 
     def _basis(
         self, cosine: Float[Array, "ray"]
-    ) -> Float[Array, "way ray azimuth pair"]:
-        """The harmonics of travel for views upwards and downwards."""
-        count, azimuths = self.turned.shape[1], self.suns.azimuths
+    ) -> Float[Array, "way stokes ray azimuth row"]:
+        """The functions of travel of all moments, for views upwards and downwards.
+
+        In I, Q and U, as of `_harmonics`.
+        """
+        count, k = self.turned.shape[1], self.polarised.shape[1]
+        travels = jnp.stack([-cosine, cosine])
+        around = lambda wave, m: jnp.asarray(
+            wave(np.multiply.outer(self._azimuths(), m)), cosine.dtype
+        )
+        spread = lambda x, wave, m: x[:, :, None] * around(wave, m)[None, None]
         l, m = pairs(count)
-        azimuth = (np.arange(azimuths) + 0.5) * (math.pi / azimuths)
-        around = jnp.asarray(np.cos(np.multiply.outer(azimuth, m)), cosine.dtype)
-        found = harmonics(-cosine, count)[:, l, m]
-        sign = jnp.asarray((-1.0) ** (l + m), found.dtype)
-        both = jnp.stack([found, found * sign[None]])
-        return both[:, :, None] * around[None, None]
+        p = spread(harmonics(travels, count)[..., l, m], np.cos, m)
+        if self.stokes == 1:
+            return p[:, None]
+        l, m = pairs(k)
+        r, s = (x[..., l, m] for x in spin_harmonics(travels, k))
+        q = [spread(x, np.cos, m) for x in (r, s)]
+        u = [spread(x, np.sin, m) for x in (s, r)]
+        zero = jnp.zeros_like
+        rows = [p, zero(q[0]), zero(q[1])], [zero(p), *q], [zero(p), *u]
+        return jnp.stack([jnp.concatenate(x, -1) for x in rows], 1)
+
+    def _azimuths(self) -> np.ndarray:
+        return (np.arange(self.suns.azimuths) + 0.5) * (math.pi / self.suns.azimuths)
 
     def _gathered(
         self,
-        basis: Float[Array, "ray azimuth pair"],
+        basis: Float[Array, "stokes ray azimuth row"],
         level: Int[Array, ""],
-        light: Float[Array, "ray azimuth sun wl"],
-    ) -> tuple[Float[Array, "pair sun wl"], Float[Array, "sun wl"]]:
+        light: Float[Array, "stokes ray azimuth sun wl"],
+    ) -> tuple[Float[Array, "row sun wl"], Float[Array, "sun wl"]]:
         """Moments and flux of the light that arrives at a level from one side."""
         weight, cosine = self.rays.weight[level], self.rays.cosine[level]
-        _, m = pairs(self.turned.shape[1])
+        m = pairs(self.turned.shape[1])[1]
+        if self.stokes == 3:
+            m = np.concatenate([m, *[pairs(self.polarised.shape[1])[1]] * 2])
         # Both halves of the circle, over 2 pi; twice for all but m = 0.
         share = np.where(m == 0, 1.0, 2.0) / self.suns.azimuths
-        share = jnp.asarray(share, weight.dtype)[None, None]
-        basis = basis * weight[:, None, None] * share
+        share = jnp.asarray(share, weight.dtype)[None, None, None]
+        basis = basis * weight[None, :, None, None] * share
         across = weight * cosine * (2.0 * math.pi / self.suns.azimuths)
-        moments = contract("kap,kasw->psw", basis, light)
-        return moments, contract("k,kasw->sw", across, light)
+        moments = contract("vkap,vkasw->psw", basis, light)
+        return moments, contract("k,kasw->sw", across, light[0])
 
 
 def _source(
-    basis: Float[Array, "ray azimuth pair"],
-    turned: Float[Array, "l wl"],
-    moments: Float[Array, "pair sun wl"],
-) -> Float[Array, "ray azimuth sun wl"]:
+    basis: Float[Array, "stokes ray azimuth row"],
+    turned: tuple[Float[Array, "l wl"], Float[Array, "k 3 wl"]],
+    moments: Float[Array, "row sun wl"],
+) -> Float[Array, "stokes ray azimuth sun wl"]:
     """What a layer adds to light, for an optical depth of 1."""
-    l, _ = pairs(turned.shape[0])
-    weight = turned[l] * jnp.asarray(l + 0.5, turned.dtype)[:, None]
-    return contract("kap,psw->kasw", basis, weight[:, None] * moments)
+    wide = lambda x, l: x[l][:, None] * jnp.asarray(l + 0.5, x.dtype)[:, None, None]
+    scattered, polarised = turned
+    l, _ = pairs(scattered.shape[0])
+    t, rest = moments[: len(l)], moments[len(l) :]
+    rows = wide(scattered, l) * t
+    if basis.shape[0] == 3:
+        l, _ = pairs(polarised.shape[0])
+        alpha2, alpha3, beta = (wide(polarised[:, i], l) for i in range(3))
+        e, b = jnp.split(rest, 2)
+        more = beta * t[: len(l)] + alpha2 * e, alpha3 * b
+        rows = jnp.concatenate([rows.at[: len(l)].add(beta * e), *more])
+    return contract("vkap,psw->vkasw", basis, rows)

@@ -7,13 +7,13 @@ from jax.core import Tracer
 from jaxtyping import Array, Bool, Float
 
 from ..geometry import Flat
-from ..light import Sun
 from ..optics import check_layered, layers
-from ..quantity import Angle, deg, Direction, Irradiance, Length, Position, Wavelength
+from ..quantity import Angle, deg, Length, Wavelength
 from ..scene import Scene
-from ..transport import columns, extinctions
-from ._base import AbstractSolver, check_stokes
-from ._diffuse import Field
+from ..transport import columns
+from ._base import check_stokes
+from ._diffuse import AbstractDiffuse, Diffused
+from ._field import Field
 from ._ordinates import solve_column
 from ._peaks import Peaks
 from ._suns import FlatSuns, RoundSuns
@@ -27,22 +27,7 @@ _LOWEST = 85.001 * deg
 _SHADE, _NIGHT = 16.0, 1e3
 
 
-class Fluxes(eqx.Module):
-    """The light that crosses a level plane, in W m^-2 nm^-1."""
-
-    up: Irradiance
-    diffuse: Irradiance
-    direct: Irradiance
-
-
-class Diffused(eqx.Module):
-    """Diffuse light, and the forward peaks of media that it does not notice."""
-
-    field: Field
-    peaks: Peaks
-
-
-class Columns(AbstractSolver):
+class Columns(AbstractDiffuse):
     """All orders of scattering, as if the air lay flat around every place.
 
     Discrete ordinates, half of `streams` to either side, without the forward peaks of
@@ -127,58 +112,18 @@ class Columns(AbstractSolver):
             total(mixed.polarised)[::-1],
             nodes=self.streams // 2,
         )
-        turned = lambda x: jnp.swapaxes(x[::-1], 0, 1)
+        turned = lambda x: x[::-1]
         field = Field(
             mixed,
             cut.altitude,
             suns,
-            turned(light.moments),
+            jnp.swapaxes(turned(light.moments), 1, 2),
             turned(light.up),
             turned(light.down),
-            jnp.zeros((len(zeniths), len(cut.altitude)), wavelength.dtype),
+            jnp.zeros((len(cut.altitude), len(zeniths)), wavelength.dtype),
             self.stokes,
         )
-        return Diffused(field, peaks)
-
-    def scattered(
-        self,
-        prepared: Diffused,
-        scene: Scene,
-        light: Sun,
-        wavelength: Wavelength,
-        position: Position,
-        direction: Direction,
-    ) -> Float[Array, "part wl"]:
-        look = scene, light, wavelength, position, direction
-        field, peaks = prepared.field, prepared.peaks
-        once = self.single.march(scene, peaks.within.extinction, *look[1:])
-        ahead = peaks.scattered(*look, pieces=self.pieces)
-        more = field.gather(*look, pieces=self.pieces, nodes=self.nodes)
-        once = once.at[-1].add(ahead + more[0])
-        return jnp.concatenate([once, more[1:]])
-
-    def fluxes(
-        self,
-        prepared: Diffused,
-        scene: Scene,
-        light: Sun,
-        wavelength: Wavelength,
-        position: Position,
-    ) -> Fluxes:
-        """What crosses a level plane at a place, by one light."""
-        point = scene.geometry.locate(position)
-        rise = jnp.maximum(jnp.dot(point.up, light.direction), 0.0)
-        irradiance = light.irradiance.evaluate(wavelength)
-        up, down = prepared.field.fluxes(light, point)
-        path = scene.geometry.path(point, light.direction)
-        found = columns(scene, path, path.span(scene.top).far, nodes=16)
-        passed = lambda x: (
-            rise * jnp.exp(-jnp.einsum("m,ml->l", found, x, precision="highest"))
-        )
-        direct = passed(extinctions(scene, wavelength))
-        # What went on in the forward peak is no more direct.
-        ahead = passed(prepared.peaks.without.extinction) - direct
-        return Fluxes(up * irradiance, (down + ahead) * irradiance, direct * irradiance)
+        return Diffused(field, peaks, jnp.zeros((), wavelength.dtype))
 
 
 def _towards(

@@ -5,15 +5,13 @@ from typing import ClassVar
 import equinox as eqx
 import jax.numpy as jnp
 from jax.core import Tracer
-from jaxtyping import Array, Float
 
-from ..light import Sun
 from ..optics import check_layered, layers, Mixture, mixture
-from ..quantity import Direction, Number, Position, Wavelength
+from ..quantity import Number, Wavelength
 from ..scene import Scene
 from ..transport import columns, contract
-from ._base import AbstractSolver
-from ._diffuse import Field, see_all
+from ._diffuse import AbstractDiffuse, Diffused
+from ._field import Field
 from ._second import turns
 from ._suns import EverySun
 from .single_scattering import SingleScattering
@@ -26,7 +24,7 @@ _RULE = (
 )
 
 
-class Shared(AbstractSolver):
+class Shared(AbstractDiffuse):
     """All orders of scattering, those after the first as if alike in all directions.
 
     Light that turned twice is found at `layers` altitudes for `suns` zenith angles of
@@ -73,7 +71,7 @@ class Shared(AbstractSolver):
     def baked(self, scene: Scene) -> Scene:
         return dataclasses.replace(scene, lights=())
 
-    def prepare(self, scene: Scene, wavelength: Wavelength) -> Field:
+    def prepare(self, scene: Scene, wavelength: Wavelength) -> Diffused:
         mixed = _without_peaks(scene, wavelength)
         altitude = layers(scene, mixed.extinction, self.layers).altitude
         # Farther round the world no sun lights any air that the lowest air sees.
@@ -89,29 +87,16 @@ class Shared(AbstractSolver):
         again = found.again + bright * down(found.again)
         light = found.mean(once) / (1.0 - found.mean(again))[:, None]
         whole = once + again[:, :, None] * light[:, None]
-        by_sun = lambda x: jnp.swapaxes(x, 0, 1)
-        return Field(
+        field = Field(
             mixed,
             altitude,
             suns,
-            by_sun(2.0 * light)[:, :, None],
-            by_sun(found.flux(whole, -1.0)),
-            by_sun(found.flux(whole, 1.0)),
-            jnp.zeros((self.suns, len(altitude)), wavelength.dtype),
+            2.0 * light[:, None],
+            found.flux(whole, -1.0),
+            found.flux(whole, 1.0),
+            jnp.zeros((len(altitude), self.suns), wavelength.dtype),
         )
-
-    def scattered(
-        self,
-        prepared: Field,
-        scene: Scene,
-        light: Sun,
-        wavelength: Wavelength,
-        position: Position,
-        direction: Direction,
-    ) -> Float[Array, "part wl"]:
-        look = scene, light, wavelength, position, direction
-        fine = {"pieces": self.pieces, "nodes": self.nodes}
-        return see_all(prepared, self.single, *look, **fine)
+        return Diffused(field, None, jnp.zeros((), wavelength.dtype))
 
 
 def _without_peaks(scene: Scene, wavelength: Wavelength) -> Mixture:

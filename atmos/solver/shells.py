@@ -9,15 +9,16 @@ from jax.core import Tracer
 from jaxtyping import Array, Float
 
 from ..geometry import Flat
-from ..light import Sun
-from ..optics import check_layered, layers, Mixture, mixture
-from ..quantity import Direction, Number, Position, Wavelength
+from ..optics import check_layered, layers, Mixture
+from ..quantity import Wavelength
 from ..scene import Scene
 from ..transport import contract
-from ._base import AbstractSolver
-from ._diffuse import Field, see_all
+from ._base import check_stokes
+from ._diffuse import AbstractDiffuse, Diffused
+from ._field import Field
 from ._krylov import fixed_point
 from ._once import Once
+from ._peaks import Peaks
 from ._rays import rays
 from ._step import Suns
 from ._sunlight import sunlight
@@ -26,14 +27,7 @@ from ._sweep import Light, Sweep
 from .single_scattering import SingleScattering
 
 
-class Solution(eqx.Module):
-    """Diffuse light, and what share of its first order is missing in the whole."""
-
-    field: Field
-    error: Number
-
-
-class Shells(AbstractSolver):
+class Shells(AbstractDiffuse):
     """All orders of scattering in a round world, by day, in twilight and from space.
 
     Light is carried along straight lines from one of `layers` shells of air to the
@@ -49,7 +43,9 @@ class Shells(AbstractSolver):
 
     Raises `ValueError` for a flat world, where a medium does not depend on altitude
     alone, where media have more edges than there are layers, and where `tolerance` is
-    not reached.
+    not reached; for other `stokes` than 1 and 3, and for 3 with fewer than 3 degrees.
+
+    With `stokes` 3 the light is polarised, which changes its radiance too.
     """
 
     around: ClassVar[int] = 17
@@ -63,7 +59,14 @@ class Shells(AbstractSolver):
     pieces: int = eqx.field(static=True, default=12)
     nodes: int = eqx.field(static=True, default=3)
     single: SingleScattering = SingleScattering()
-    stokes: int = eqx.field(static=True, init=False, default=1)
+    stokes: int = eqx.field(static=True, default=1)
+
+    def __check_init__(self):
+        check_stokes(self.stokes)
+        if self.stokes == 3 and self.degrees < 3:
+            raise ValueError(
+                f"`degrees` must be at least 3 where `stokes` is 3; got {self.degrees}."
+            )
 
     def check(self, scene: Scene, wavelength: Wavelength) -> Scene:
         check_layered(scene)
@@ -74,8 +77,9 @@ class Shells(AbstractSolver):
     def baked(self, scene: Scene) -> Scene:
         return dataclasses.replace(scene, lights=())
 
-    def prepare(self, scene: Scene, wavelength: Wavelength) -> Solution:
-        mixed = mixture(scene, wavelength, self.degrees + 1).truncated()
+    def prepare(self, scene: Scene, wavelength: Wavelength) -> Diffused:
+        peaks = Peaks.of(scene, wavelength, self.degrees, self.stokes)
+        mixed = peaks.without
         start, once = self._start(scene, wavelength, mixed)
 
         # First to see how bright it is, then relative to that.
@@ -94,19 +98,12 @@ class Shells(AbstractSolver):
         light, error = fixed_point(
             lambda x: sweep.carry(x.moments), first, self.tolerance, self.orders
         )
-        by_sun = lambda x: jnp.moveaxis(x, -2, 0)
-        field = Field(
-            mixed,
-            start.rays.altitude,
-            start.suns.zenith,
-            by_sun(light.moments),
-            by_sun(light.up),
-            by_sun(light.down),
-            reference.T,
-        )
-        return Solution(field, jnp.max(error, initial=0.0))
+        levels, suns = start.rays.altitude, start.suns.zenith
+        found = light.moments, light.up, light.down, reference
+        field = Field(mixed, levels, suns, *found, self.stokes)
+        return Diffused(field, peaks, jnp.max(error, initial=0.0))
 
-    def found(self, prepared: Solution) -> Solution:
+    def found(self, prepared: Diffused) -> Diffused:
         rule = f"`tolerance` must be reached within {self.orders} `orders`"
         error, enough = prepared.error, prepared.error <= self.tolerance
         if isinstance(error, Tracer):
@@ -129,33 +126,22 @@ class Shells(AbstractSolver):
         within = lambda x: contract("km,m...->k...", cut.column, x)
         depth = within(mixed.extinction)[:, None]
         thick = depth > 0.0
-        turned = within(mixed.scattering) / jnp.where(thick, depth, 1.0)
+        share = jnp.where(thick, 1.0 / jnp.where(thick, depth, 1.0), 0.0)
         through = lambda steps: contract("ikm,ml->ikl", steps.column, mixed.extinction)
-        albedo = scene.ground.evaluate(wavelength)
+        ground = scene.ground.evaluate(wavelength)
         start = Sweep(
             rays=lines,
             suns=suns,
             up=through(lines.up),
             down=through(lines.down),
-            turned=jnp.where(thick, turned, 0.0),
-            albedo=jnp.broadcast_to(albedo, wavelength.shape),
+            turned=within(mixed.scattering) * share,
+            polarised=within(mixed.polarised) * share[:, None],
+            albedo=jnp.broadcast_to(ground, wavelength.shape),
             reference=jnp.zeros((self.layers + 1, self.suns), wavelength.dtype),
+            stokes=self.stokes,
         )
-        stands = zenith.zeniths(), suns.azimuth()
+        stands = zenith.zeniths(), suns.azimuth(), self.stokes
         return start, Once(scene, mixed, lines, sunlight(scene), *stands)
-
-    def scattered(
-        self,
-        prepared: Solution,
-        scene: Scene,
-        light: Sun,
-        wavelength: Wavelength,
-        position: Position,
-        direction: Direction,
-    ) -> Float[Array, "part wl"]:
-        look = scene, light, wavelength, position, direction
-        fine = {"pieces": self.pieces, "nodes": self.nodes}
-        return see_all(prepared.field, self.single, *look, **fine)
 
 
 # What the logarithm of brightness at most loses from one sun to the next, and while the
