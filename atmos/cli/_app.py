@@ -24,6 +24,7 @@ app = App(
     version=lambda: importlib.metadata.version("atmos"),
     help_format="plaintext",
     result_action="return_value",
+    suppress_keyboard_interrupt=False,
 )
 
 
