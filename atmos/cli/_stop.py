@@ -32,8 +32,8 @@ class Stop:
     error: Annotated[
         float | None,
         real(
-            "Relative standard error: the root mean square over the pixels that are "
-            "not black; 0.01 for one per cent.",
+            "Relative standard error, 0.01 for one per cent: the root mean square over "
+            "the pixels that are not black, of which the dark count less.",
             1e-6,
             10.0,
             "",
