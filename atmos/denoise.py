@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from .colour import AbstractColourSpace, ACES2065_1
+from .colour import AbstractColourSpace, ACESCG
 
 
 def denoiser() -> Any:
@@ -33,8 +33,8 @@ def denoise(
     of `denoiser`.
     """
     pyoidn = denoiser()
-    # All that can be seen lies in this gamut: it needs no numbers below 0.
-    light = ACES2065_1.from_xyz(space.to_xyz(jnp.asarray(image, np.float32)))
+    # Hardly anything lies outside this gamut: it needs no numbers below 0.
+    light = ACESCG.from_xyz(space.to_xyz(jnp.asarray(image, np.float32)))
     light = np.maximum(np.asarray(light), 0.0)
     lit = light[light > 0.0]
     if not lit.size:
@@ -43,5 +43,5 @@ def denoise(
     scale = np.mean(lit)
     clean = pyoidn.denoise(np.ascontiguousarray(light / scale), hdr=True)
     clean = jnp.asarray(np.maximum(clean, 0.0) * scale)
-    values = np.asarray(space.from_xyz(ACES2065_1.to_xyz(clean)), image.dtype)
+    values = np.asarray(space.from_xyz(ACESCG.to_xyz(clean)), image.dtype)
     return values if space.signed else np.maximum(values, 0.0)
