@@ -425,7 +425,11 @@ BAD = [
     ("render thin.toml --solver shells", "--solver", '"trace"'),
     ("sky --position 1,2", "--position", "three numbers; got [1.0, 2.0]"),
     ("sky --position 1,2,3 --altitude 4", "--altitude", "beside --position"),
-    ("sky --position 1,0,3 --height 8", "--position", "straight above the origin"),
+    (
+        "sky thin.toml --position 1,0,3 --no-sun",
+        "--position",
+        "straight above the origin",
+    ),
     ("radiance", "SCENE", "requires"),
     ("radiance thin.toml --solver mc", "--solver", '"single"'),
     ("radiance thin.toml --view-zenith 0,190", "--view-zenith", "0 to 180; got '190'"),

@@ -96,10 +96,17 @@ def sky(
     step = (wavelength[-1] - wavelength[0]) / max(1, wavelength.size - 1) or 10.0
     found = make_scene(scene, world, sun, float(step))
     method = solver_named(solver, stokes, float(camera.position[2]))
-    solved = lambda: solve_file(found, method, wavelength, scene, bake)
+    aside = np.any(np.asarray(camera.position)[:2] != 0.0)
+
+    def solved():
+        made = solve_file(found, method, wavelength, scene, bake)
+        if made.has_panorama and aside:
+            rule = "must lie straight above the origin, in air that is layered"
+            refuse("--position", rule, camera.position.tolist())
+        return made
+
     said |= {"solver": str(method)} | described(found, camera)
-    with about({"position": "--position"}):
-        write_picture(solved, camera, wavelength, files, paths, said, look)
+    write_picture(solved, camera, wavelength, files, paths, said, look)
 
 
 def _seen(
