@@ -3,8 +3,11 @@
 from . import (
     bake as bake,
     camera as camera,
+    checkpoint as checkpoint,
     colour as colour,
     comparison as comparison,
+    denoise as denoise,
+    film as film,
     geometry as geometry,
     gridfile as gridfile,
     image as image,

@@ -69,6 +69,7 @@ def write_exr(
     space: AbstractColourSpace,
     *,
     stokes: Float[Array | np.ndarray, "2 height width 3"] | None = None,
+    layers: Mapping[str, Float[Array | np.ndarray, "height width 3"]] | None = None,
     half: bool = False,
     latlong: bool = False,
     attributes: Mapping[str, Attribute] | None = None,
@@ -79,8 +80,9 @@ def write_exr(
     they are. `whiteLuminance` is the luminance of (1, 1, 1) in cd m^-2, and
     `luminanceWeights` are those of (1, 0, 0), (0, 1, 0), (0, 0, 1). `stokes` are Q and
     U in the same colour space, for layers of these names (Q.R and so on): through a
-    polariser at an angle psi one sees (RGB + Q cos 2 psi + U sin 2 psi) / 2.
-    `attributes` come on top; numbers are kept in single precision.
+    polariser at an angle psi one sees (RGB + Q cos 2 psi + U sin 2 psi) / 2. Other
+    `layers` have names of their own (variance.R), and are never halves. `attributes`
+    come on top; numbers are kept in single precision.
 
     Raises `ValueError` for values that are not finite, that 16 or 32 bits cannot hold,
     or that no light has (below 0, but for colours outside the gamut of an RGB space:
@@ -96,7 +98,7 @@ def write_exr(
             names = [f"{layer}.{x}" for x in "RGB"]
             channels |= _channels("stokes", plane, names, half, True)
         header |= _FRAME
-    _write(path, header, channels)
+    _write(path, header, channels | _layers(layers, ["R", "G", "B"], space.signed))
 
 
 def write_spectral_exr(
@@ -105,6 +107,7 @@ def write_spectral_exr(
     wavelength: Float[Array | np.ndarray, "wl"],
     *,
     stokes: Float[Array | np.ndarray, "2 height width wl"] | None = None,
+    layers: Mapping[str, Float[Array | np.ndarray, "height width wl"]] | None = None,
     half: bool = False,
     latlong: bool = False,
     attributes: Mapping[str, Attribute] | None = None,
@@ -115,6 +118,7 @@ def write_spectral_exr(
     spectral images", JCGT 10(3)). Where the wavelengths cover what the eye sees, there
     is a preview in linear Rec.709 too, with the header of `write_exr`. `stokes` are Q
     and U, for channels S1 and S2; S3 is written too, as the layout wants it, and is 0.
+    `layers` are those of `write_exr` (variance.S0.550,000000nm).
     Errors and warnings are those of `write_exr`; `wavelength` has to rise.
     """
     pixels, bands = np.asarray(radiance), np.asarray(wavelength, float)
@@ -141,6 +145,7 @@ def write_spectral_exr(
         preview = pixels @ weights.astype(pixels.dtype)
         channels |= _channels("radiance", preview, ["R", "G", "B"], half, True)
         header |= _colours(REC709, preview)
+    channels |= _layers(layers, names, False)
     _write(path, header | _projection(latlong) | _extra(attributes), channels)
 
 
@@ -278,6 +283,16 @@ def _channels(
                 stacklevel=3,
             )
     return dict(zip(names, planes, strict=True))
+
+
+def _layers(
+    layers: Mapping[str, Array | np.ndarray] | None, names: list[str], signed: bool
+) -> dict[str, np.ndarray]:
+    found = {}
+    for layer, pixels in (layers or {}).items():
+        named = [f"{layer}.{x}" for x in names]
+        found |= _channels(f"layers[{layer}]", np.asarray(pixels), named, False, signed)
+    return found
 
 
 def _colours(space: AbstractColourSpace, pixels: np.ndarray) -> dict[str, Any]:

@@ -41,7 +41,11 @@ ROOMS = [
     "disk",
     "rays",
     "scenefile",
+    "archive",
     "bake",
+    "film",
+    "checkpoint",
+    "denoise",
     "cli",
 ]
 
@@ -56,6 +60,7 @@ KNOWN_BY = {
     "OpenEXR": "image.py",
     "PIL": "image.py",
     "platformdirs": "reference.py",
+    "pyoidn": "denoise.py",
     "rich": "cli/_session.py",
 }
 

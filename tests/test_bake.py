@@ -14,7 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from atmos import bake
+from atmos import archive, bake
 from atmos.cli import main
 from atmos.geometry import Flat
 from atmos.light import Sun
@@ -117,10 +117,10 @@ def test_what_was_made_of_something_else_is_refused(
 @pytest.mark.parametrize("key", ["VERSION", "atmos"])
 def test_other_versions_are_refused(kept, monkeypatch, key):
     if key == "VERSION":
-        monkeypatch.setattr(bake, "VERSION", 1)
+        monkeypatch.setattr(bake, "KIND", bake.KIND._replace(version=1))
         found = "`version` is 2 there and 1 here"
     else:
-        monkeypatch.setattr(bake.importlib.metadata, "version", lambda _: "9.9")
+        monkeypatch.setattr(archive.importlib.metadata, "version", lambda _: "9.9")
         found = "`atmos` is .* there and 9.9 here"
     with pytest.raises(ValueError, match=f"sky.bake: serves another sky: {found}"):
         bake.load(kept[1], slab(), SOLVER, NM)
@@ -188,7 +188,7 @@ def test_what_stops_the_writing_leaves_all_as_it_was(kept, tmp_path, monkeypatch
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr(bake.np, "savez", stop)
+        patch.setattr(np, "savez", stop)
         with pytest.raises(KeyboardInterrupt):
             bake.save(kept[0], path)
         assert not os.listdir(tmp_path)
@@ -203,8 +203,8 @@ def test_a_process_that_is_killed_leaves_no_bake(tmp_path):
     # Killed when all is written but the checksum: nothing has the file's name.
     code = (
         "import os, signal, jax, numpy as np\n"
-        "from atmos import bake\n"
-        "bake.hashlib.sha256 = lambda *_: os.kill(os.getpid(), signal.SIGKILL)\n"
+        "from atmos import archive, bake\n"
+        "archive.hashlib.sha256 = lambda *_: os.kill(os.getpid(), signal.SIGKILL)\n"
         "from types import SimpleNamespace as N\n"
         "bake._made = lambda *_: {}\n"
         "bake.save(N(prepared=np.zeros(9), scene=0, solver=0, wavelength=0), 'x.bake')"

@@ -14,7 +14,9 @@ import pytest
 from PIL import Image
 
 import atmos
+from atmos.camera import Perspective
 from atmos.cli import main, SunPosition
+from atmos.cli._view import View
 from atmos.colour import COLOUR_SPACES
 from atmos.image import read_exr
 from atmos.scenefile import dump, load, parse
@@ -199,6 +201,28 @@ top = 100
 emission = 0.5
 profile = { kind = "box", lower = [-9, -9, 0], upper = [9, 9, 12] }
 """
+
+
+def test_options_stand_above_the_camera_of_the_scene():
+    own = Perspective(jnp.array([1.0, 2.0, 3.0]), 0.5, 0.2, 0.7, 40, 90)
+    assert View().camera(own) is own
+    nearer = View(field_of_view=10.0, height=20).camera(own)
+    assert (nearer.height, nearer.width) == (20, 45)
+    np.testing.assert_allclose(nearer.field_of_view, math.radians(10.0))
+    np.testing.assert_allclose(nearer.azimuth, 0.5)
+    np.testing.assert_allclose(nearer.elevation, 0.2)
+    np.testing.assert_allclose(View(altitude=9.0).camera(own).position, [1, 2, 9])
+    place = (4.0, 5.0, 6.0)
+    assert tuple(View(position=place).camera(own).position) == place
+    # Of a camera of another kind only the place is left.
+    dome = View(projection="latlong").camera(own)
+    np.testing.assert_array_equal(dome.position, own.position)
+    assert (dome.height, dome.width, dome.centre_azimuth) == (512, 1024, 0.0)
+    for camera in (dome, View(projection="fisheye", azimuth=30.0).camera()):
+        turned = View(azimuth=90.0).camera(camera)
+        assert type(turned) is type(camera)
+        looks = turned.direction(*jnp.array([0.5, 0.25]) * turned.width)
+        np.testing.assert_allclose(looks[1], 0.0, atol=1e-6)
 
 
 def test_what_shines_is_marched_along_every_ray(capsys, folder):
@@ -391,6 +415,21 @@ BAD = [
     ("compare none.exr preetham", "none.exr", "No such file"),
     ("compare preetham cie", "cie", "needs --zenith-luminance"),
     ("compare a.exr b.exr --sun-elevation 5", "a sun", "not for two files"),
+    ("render", "SCENE", "requires"),
+    ("render none.toml", "none.toml", "No such file"),
+    ("render thin.toml --samples 0", "--samples", "from 1 to 1e+09; got '0'"),
+    ("render thin.toml --error 0", "--error", "1e-06 to 10; got '0'"),
+    ("render thin.toml --time -1", "--time", "got '-1'"),
+    ("render thin.toml --output a.png", "--output", ".exr file; got a.png"),
+    ("render thin.toml --colour-space spectral --denoise", "--denoise", "spectral"),
+    ("render thin.toml --solver shells", "--solver", '"trace"'),
+    ("sky --position 1,2", "--position", "three numbers; got [1.0, 2.0]"),
+    ("sky --position 1,2,3 --altitude 4", "--altitude", "beside --position"),
+    (
+        "sky thin.toml --position 1,0,3 --no-sun",
+        "--position",
+        "straight above the origin",
+    ),
     ("radiance", "SCENE", "requires"),
     ("radiance thin.toml --solver mc", "--solver", '"single"'),
     ("radiance thin.toml --view-zenith 0,190", "--view-zenith", "0 to 180; got '190'"),

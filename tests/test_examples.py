@@ -2,11 +2,14 @@
 
 import importlib.util
 import pathlib
+import re
 
 import jax.numpy as jnp
 import numpy as np
+import pytest
 
 from atmos import colour, polarisation, render, solve
+from atmos.scenefile import parse, parse_camera
 from atmos.solver import QUICK, SingleScattering
 from atmos.transport import direct_irradiance
 
@@ -60,3 +63,18 @@ def test_volumes():
     assert np.all(xyz[0, 0] == 0.0), "there is no air beside the smoke"
     red, _, blue = xyz.reshape(-1, 3)[np.argmax(xyz[..., 1])]
     assert red > 3.0 * blue, "fire is yellow"
+
+
+@pytest.mark.parametrize("name", ["cumulus", "fire"])
+def test_scene_files(name):
+    text = (EXAMPLES / f"{name}.toml").read_text()
+    coarse = re.sub(r"cells = .*", "cells = [20, 20, 20]", text)
+    camera = parse_camera(coarse)
+    assert (camera.height, float(camera.azimuth)) == (240, 0.0)
+    for medium in parse(coarse).media:
+        if hasattr(medium.profile, "values"):
+            values = np.asarray(medium.profile.values)
+            assert 0.02 < np.mean(values > 0.0) < 0.8
+            # Its box does not cut it, but for the flat base of a cloud.
+            for side in (values[[0, -1]], values[:, [0, -1]], values[..., -1]):
+                assert np.all(side == 0.0)

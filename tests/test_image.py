@@ -24,6 +24,25 @@ WAVELENGTH = np.arange(380.0, 781.0, 20.0)
 SPECTRA = RNG.random((5, 7, WAVELENGTH.size)).astype(np.float32)
 
 
+def test_other_layers_have_names_of_their_own_and_are_never_halves(path):
+    tiny = 1e-12 * IMAGE
+    write_exr(path, IMAGE, REC709, half=True, layers={"variance": tiny})
+    picture = read_exr(path)
+    assert picture.channels["R"].dtype == np.float16
+    found = picture.stack("variance.R", "variance.G", "variance.B")
+    np.testing.assert_array_equal(found, tiny)
+    bands = WAVELENGTH[:2]
+    write_spectral_exr(
+        path, SPECTRA[..., :2], bands, layers={"variance": 2.0 * SPECTRA[..., :2]}
+    )
+    picture = read_exr(path)
+    assert list(picture.spectrum()[0]) == list(bands)
+    found = picture.channels["variance.S0.400,000000nm"]
+    np.testing.assert_array_equal(found, 2.0 * SPECTRA[..., 1])
+    with pytest.raises(ValueError, match=r"`layers\[variance\]` must be finite"):
+        write_exr(path, IMAGE, REC709, layers={"variance": np.nan * IMAGE})
+
+
 @pytest.fixture
 def path(tmp_path):
     return tmp_path / "sky.exr"

@@ -7,13 +7,14 @@ import pytest
 import vdb_files
 
 from atmos import deg, earth, km, mars, medium, phase, Scene, spectrum
+from atmos.camera import Fisheye, LatLong, Perspective
 from atmos.geometry import Flat, Spherical
 from atmos.light import Sun, sunlight
 from atmos.particle import Air, CarbonDioxide, Depolarisation, Scattering
 from atmos.particle.aerosol import opac, optical_depth
 from atmos.particle.surface import albedo
 from atmos.scene import air, haze, ozone
-from atmos.scenefile import dump, GUIDE, load, parse
+from atmos.scenefile import dump, GUIDE, load, load_camera, parse, parse_camera
 
 
 PLANET = """
@@ -28,6 +29,12 @@ SUN = """
 zenith = 60.0
 irradiance = 1.0
 angular_radius = 0.0
+"""
+CAMERA = """
+[camera]
+kind = "perspective"
+position = [0, -3e3, 200]
+azimuth = 20
 """
 AIR = """
 [[medium]]
@@ -46,7 +53,7 @@ kind = "table"
 wavelength = [400, 600, 800]
 value = [4e-5, 2e-5, 1e-5]
 """
-TEXT = PLANET + SUN + AIR + HAZE
+TEXT = PLANET + SUN + CAMERA + AIR + HAZE
 
 
 def alike(a, b):
@@ -217,6 +224,36 @@ def test_what_is_written_is_read_again(scene, dtype):
     alike(jax.tree.map(lambda x: x.astype(dtype), found), scene)
 
 
+CAMERAS = {
+    "dome": LatLong(row(0.0, 0.0, 2.0), 64, 1.0),
+    "fisheye": Fisheye(row(1.0, 2.5, 3.0), 64, 200.0 * deg, -0.3),
+    "perspective": Perspective(row(-6.5e3, 0.1, 3e5), 0.7, -0.2, 40.0 * deg, 3, 7),
+}
+
+
+@pytest.mark.parametrize("camera", CAMERAS.values(), ids=CAMERAS)
+@pytest.mark.parametrize("dtype", [jnp.float64, jnp.float32])
+def test_a_camera_is_written_and_read_again(camera, dtype):
+    camera = jax.tree.map(lambda x: x.astype(dtype), camera)
+    text = dump(SCENES["no sun"], camera=camera)
+    found = jax.tree.map(lambda x: x.astype(dtype), parse_camera(text))
+    alike(found, camera)
+    assert len(parse(text).media) == 1
+    assert parse_camera(PLANET + SUN) is None
+
+
+def test_a_sampled_profile_is_a_grid_of_it():
+    fog = 'profile = { kind = "height_fog", top = 10, scale_height = 50 }'
+    box = "lower = [0, 0, 0], upper = [30, 20, 100], cells = [3, 2, 5]"
+    text = f"[[medium]]\nabsorption = 1.0\nprofile = {{ kind = 'sampled', {box}, of = "
+    found = parse(PLANET + SUN + text + fog.removeprefix("profile = ") + " }").media[0]
+    due = np.exp(-np.maximum(np.arange(10.0, 100.0, 20.0) - 10.0, 0.0) / 50.0)
+    np.testing.assert_allclose(
+        found.profile.values, np.broadcast_to(due, (3, 2, 5)), rtol=1e-12
+    )
+    np.testing.assert_array_equal(found.profile.upper, [30.0, 20.0, 100.0])
+
+
 def test_the_sun_and_the_ground_are_written_by_name():
     text = dump(SCENES["earth"], ["air", "ozone", "haze"])
     assert 'irradiance = { kind = "solar", bandwidth = 5.0, distance = 1.0163 }' in text
@@ -230,7 +267,7 @@ def test_the_guide_names_every_kind():
     kinds = """exponential tent uniform table standard_atmosphere ball grid isotropic
     rayleigh henyey_greenstein double_henyey_greenstein cornette_shanks draine
     empirical_mie power_law molecules ozone solar height_fog everywhere box file noise
-    puff transformed product blackbody""".split()
+    puff transformed product blackbody sampled latlong fisheye perspective""".split()
     assert all(f'kind = "{x}"' in GUIDE for x in kinds)
     assert parse(GUIDE + TEXT).top == 60e3
 
@@ -382,6 +419,23 @@ BAD = [
         "got 400000.0",
     ),
     ("[[medium]]", "[[medium]]\n[[medium]]", "`medium[0].profile` is missing", ""),
+    ("azimuth = 20", "azimuth = 400", "`camera.azimuth`", "360 or less; got 400"),
+    ("azimuth = 20", "elevation = 91", "`camera.elevation`", "90 or less; got 91"),
+    ("azimuth = 20", "field_of_view = 0", "`camera.field_of_view`", "above 0; got 0"),
+    ("azimuth = 20", "height = 2.5", "`camera.height` must be a whole number", "2.5"),
+    ("azimuth = 20", "zenith = 3", "`camera.zenith` is not known", "field_of_view"),
+    (
+        "-3e3, 200",
+        "200",
+        "`camera.position` must be a list of length 3",
+        "got [0, 200]",
+    ),
+    (
+        'kind = "perspective"\nposition',
+        'kind = "panorama"\nposition',
+        "`camera.kind` must be one of latlong, fisheye, perspective",
+        "got 'panorama'",
+    ),
     ("[[medium]]", "[[medium]", "must be TOML", "line"),
     ("[sun]", f"x = {'[' * 3000}", "must be TOML", ""),
 ]
@@ -393,6 +447,9 @@ def test_a_bad_file_is_refused_by_key_rule_and_value(tmp_path, old, new, key, re
     path.write_text(changed(old, new))
     with pytest.raises(ValueError) as caught:
         load(path)
+    if "camera" in key:
+        with pytest.raises(ValueError, match="camera"):
+            load_camera(path)
     assert str(caught.value).startswith(f"{path}: ")
     assert key in str(caught.value) and rest in str(caught.value)
 

@@ -146,7 +146,7 @@ def see_polarised(sky, zenith, views):
 
 
 def test_polarised_light_on_a_huge_planet_is_as_published():
-    """Natraj, Li and Yung 2009, ApJ 691, 1909: depth 0.5, a ground that returns 0.25."""
+    """Natraj, Li and Yung 2009, ApJ 691, 1909: depth 0.5, albedo of the ground 0.25."""
     scene = numbers(depth=0.5, haze=0.0, ground=0.25, radius=1e3 * RADIUS)
     air = dataclasses.replace(scene.media[0], phase=Rayleigh(0.0))
     scene = dataclasses.replace(scene, media=(air,))

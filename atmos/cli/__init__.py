@@ -1,4 +1,4 @@
-"""The command line: `atmos sky`, `compare`, `radiance`, `optical-depth`, `scene`."""
+"""The command line: `atmos sky`, `render`, `scene`, `compare`, and tables."""
 
 import os
 import sys
@@ -9,6 +9,7 @@ from typing import Any
 from . import (
     _compare as _compare,
     _picture as _picture,
+    _render as _render,
     _scene as _scene,
     _table as _table,
 )

@@ -12,6 +12,7 @@ _MOST_NUMBERS = 10**6
 # As far away as the moon is three times; squares still fit into single precision.
 HIGHEST = 1e9
 SIGNED = {"allow_leading_hyphen": True}
+STOP = Group("Until", sort_key=0)
 WORLD = Group("World", sort_key=1)
 SUN = Group("Sun", sort_key=2)
 MODEL = Group("Fitted sky", sort_key=3)
@@ -23,6 +24,7 @@ app = App(
     version=lambda: importlib.metadata.version("atmos"),
     help_format="plaintext",
     result_action="return_value",
+    suppress_keyboard_interrupt=False,
 )
 
 

@@ -28,8 +28,9 @@ from ._app import (
     WORLD,
 )
 from ._model import Model, MODELS
-from ._options import check_output, SunPosition, View, World
+from ._options import check_output, SunPosition, World
 from ._session import progress_bar, start
+from ._view import View
 from ._world import about, make_scene, solve_file, solver_named
 
 

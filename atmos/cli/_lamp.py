@@ -89,12 +89,12 @@ def _beam(sky: AbstractSky, light: Sun, position: Position) -> Irradiance:
     return sky.beam(light, position)
 
 
-def described(scene: Scene) -> dict[str, str]:
-    """What the header says of a scene."""
+def described(scene: Scene, camera: AbstractCamera) -> dict[str, str]:
+    """What the header says of a scene: a scene file."""
     # A cloud of millions of cells is no text; some things have no words.
     if sum(x.size for x in jax.tree.leaves(scene)) <= _MOST_NUMBERS:
         with contextlib.suppress(ValueError):
-            return {"scene": dump(scene)}
+            return {"scene": dump(scene, camera=camera)}
     return {}
 
 

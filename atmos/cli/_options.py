@@ -7,11 +7,9 @@ import os
 from pathlib import Path
 from typing import Annotated, Literal
 
-import numpy as np
-
-from ..camera import AbstractCamera, Fisheye, LatLong, Perspective
+from ..camera import AbstractCamera
+from ..image import Attribute
 from ..light import ephemeris
-from ..quantity import deg
 from ._app import (
     exposure_value,
     HIGHEST,
@@ -22,12 +20,9 @@ from ._app import (
     refuse,
     SIGNED,
     switch,
-    whole,
 )
 
 
-# The largest picture is 32768 pixels high.
-MOST_PIXELS = 2**15
 Wavelengths = Annotated[
     tuple[float, ...],
     numbers_option("Wavelengths, in nm: numbers, or FIRST:LAST:STEP.", 100, 1e5),
@@ -160,83 +155,16 @@ class SunPosition:
 
 
 @dataclasses.dataclass(frozen=True)
-class View:
-    """What the picture shows."""
-
-    projection: Annotated[
-        Literal["latlong", "fisheye", "perspective"], option("Kind of picture.")
-    ] = "latlong"
-    height: Annotated[int, whole("Rows of pixels.", 1, MOST_PIXELS)] = 512
-    width: Annotated[
-        int | None,
-        whole(
-            "Columns of pixels, in perspective.  [default: 3/2 of the height]",
-            1,
-            MOST_PIXELS,
-        ),
-    ] = None
-    altitude: Annotated[
-        float, real("Of the observer, above the ground.", 0, HIGHEST, "METRES")
-    ] = 2.0
-    azimuth: Annotated[
-        float,
-        real(
-            "Clockwise from north: where the centre of the picture looks; in a fisheye "
-            "its top.",
-            -360,
-            360,
-            "DEGREES",
-            name=("--azimuth", "--center-azimuth", "--centre-azimuth"),
-        ),
-    ] = 0.0
-    elevation: Annotated[
-        float | None,
-        real("Above level, in perspective.  [default: 15]", -90, 90, "DEGREES"),
-    ] = None
-    field_of_view: Annotated[
-        float | None,
-        real(
-            "From side to side: in perspective below 180  [default: 60], in a fisheye "
-            "up to 360  [default: 180].",
-            1e-3,
-            360,
-            "DEGREES",
-        ),
-    ] = None
-
-    def camera(self) -> AbstractCamera:
-        """The camera that takes it."""
-
-        only = {"--width": self.width, "--elevation": self.elevation}
-        for name, value in only.items():
-            if value is not None and self.projection != "perspective":
-                refuse(name, "is for --projection perspective alone")
-        if self.field_of_view is not None and self.projection == "latlong":
-            refuse("--field-of-view", "is not for --projection latlong")
-        position = np.array([0.0, 0.0, self.altitude])
-        if self.projection == "latlong":
-            return LatLong(position, self.height, self.azimuth * deg)
-        if self.projection == "fisheye":
-            angle = (self.field_of_view or 180.0) * deg
-            return Fisheye(position, self.height, angle, self.azimuth * deg)
-        angle = self.field_of_view or 60.0
-        if angle >= 180.0:
-            refuse("--field-of-view", "must be below 180 in perspective", angle)
-        return Perspective(
-            position=position,
-            azimuth=self.azimuth * deg,
-            elevation=(15.0 if self.elevation is None else self.elevation) * deg,
-            field_of_view=angle * deg,
-            height=self.height,
-            width=self.width or max(1, round(1.5 * self.height)),
-        )
-
-
-@dataclasses.dataclass(frozen=True)
 class Files:
     """What is written, and how."""
 
-    output: Annotated[Path, option("The OpenEXR file.")] = Path("sky.exr")
+    output: Annotated[
+        Path | None,
+        option(
+            "The OpenEXR file.  [default: sky.exr; of a scene that is rendered, "
+            "its name]"
+        ),
+    ] = None
     colour_space: Annotated[
         Literal["rec709", "acescg", "aces2065-1", "xyz", "spectral"],
         option(
@@ -274,17 +202,21 @@ class Files:
         ),
     ] = None
 
-    def check(self) -> Path | None:
-        """The PNG file, if one is wanted. Refuses what could not be written."""
-        check_output("--output", self.output, ".exr")
+    def check(self, name: str) -> tuple[Path, Path | None]:
+        """The OpenEXR file, and the PNG file if one is wanted.
+
+        Of this name, unless another is asked for. Refuses what could not be written.
+        """
+        output = self.output or Path(f"{name}.exr")
+        check_output("--output", output, ".exr")
         if self.no_preview:
             if self.preview is not None or self.exposure is not None:
                 name = "--exposure" if self.preview is None else "--preview"
                 refuse(name, "must not stand beside --no-preview")
-            return None
-        preview = self.preview or self.output.with_suffix(".png")
+            return output, None
+        preview = self.preview or output.with_suffix(".png")
         check_output("--preview", preview, ".png")
-        return preview
+        return output, preview
 
 
 def check_output(option: str, path: Path, suffix: str = "") -> None:
@@ -310,9 +242,10 @@ def check_bake(path: Path | None, solver: str) -> None:
         check_output("--bake", path)
 
 
-def observed(sun: SunPosition, view: View) -> dict[str, str | float]:
+def observed(sun: SunPosition, camera: AbstractCamera) -> dict[str, Attribute]:
     """What the header says of when and where."""
-    found: dict[str, str | float] = {"altitude": view.altitude}
+    place = [round(float(x), 6) for x in camera.position]
+    found: dict[str, Attribute] = {"altitude": place[2], "position": tuple(place)}
     if sun.date is not None and sun.latitude is not None and sun.longitude is not None:
         found["capDate"] = sun.date.strftime("%Y:%m:%d %H:%M:%S")
         ahead = sun.date.utcoffset() or datetime.timedelta()

@@ -1,19 +1,16 @@
 """`atmos sky`: pictures."""
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
-import jax.numpy as jnp
 import numpy as np
 
-from .. import colour, image
-from ..camera import AbstractCamera, LatLong
-from ..disk import render_disks
-from ..render import render, render_stokes
+from ..camera import AbstractCamera
+from ..render import render, render_stokes, Response
+from ..scenefile import load_camera
 from ..sky import AbstractSky
 from ._app import app, CAMERA, flat, MODEL, option, OUTPUT, refuse, SUN, WORLD
-from ._lamp import described, header, measure_lamp
+from ._lamp import described
 from ._model import Model
 from ._options import (
     Bake,
@@ -24,14 +21,12 @@ from ._options import (
     SOLVERS,
     Stokes,
     SunPosition,
-    View,
     World,
 )
 from ._session import progress_bar, start
+from ._view import View
 from ._world import about, make_scene, solve_file, solver_named
-
-
-_LARGEST_HALF = 65504.0
+from ._write import Seen, write_picture
 
 
 @app.command
@@ -73,7 +68,7 @@ def sky(
     """
     world, sun, view = world or World(), sun or SunPosition(), view or View()
     files, model = files or Files(), model or Model()
-    preview = files.check()
+    paths = files.check("sky")
     kind = model.model
     model.check([kind] if kind else [], world)
     if kind is not None:
@@ -87,78 +82,38 @@ def sky(
     start()
 
     wavelength = np.array(files.wavelength or model.bands(kind), np.float32)
-    camera, said = view.camera(), observed(sun, view)
+    camera = view.camera(None if scene is None else load_camera(scene))
+    said = observed(sun, camera)
+    look = lambda sky, camera, response: _seen(sky, camera, response, stokes)
     if kind is not None:
         if kind == "hosek-rgb" and files.colour_space == "spectral":
             refuse("--colour-space", "must not be spectral with --model hosek-rgb")
         said |= {"model": str(model)}
         fitted = lambda: model.sky(kind, sun, world, wavelength)
         with about({"position": "--altitude"}):
-            write_picture(fitted, camera, wavelength, files, preview, said)
+            write_picture(fitted, camera, wavelength, files, paths, said, look)
         return
     step = (wavelength[-1] - wavelength[0]) / max(1, wavelength.size - 1) or 10.0
     found = make_scene(scene, world, sun, float(step))
     method = solver_named(solver, stokes, float(camera.position[2]))
-    solved = lambda: solve_file(found, method, wavelength, scene, bake)
-    said |= {"solver": str(method)} | described(found)
-    write_picture(solved, camera, wavelength, files, preview, said, stokes)
+    aside = np.any(np.asarray(camera.position)[:2] != 0.0)
+
+    def solved():
+        made = solve_file(found, method, wavelength, scene, bake)
+        if made.has_panorama and aside:
+            rule = "must lie straight above the origin, in air that is layered"
+            refuse("--position", rule, camera.position.tolist())
+        return made
+
+    said |= {"solver": str(method)} | described(found, camera)
+    write_picture(solved, camera, wavelength, files, paths, said, look)
 
 
-def write_picture(
-    made: Callable[[], AbstractSky],
-    camera: AbstractCamera,
-    wavelength: np.ndarray,
-    files: Files,
-    preview: Path | None,
-    said: dict[str, str | float],
-    stokes: int = 1,
-) -> None:
-    """Renders a sky and writes what was asked for."""
-    spectral = files.colour_space == "spectral"
-    space = colour.COLOUR_SPACES["rec709" if spectral else files.colour_space]
-    seen = not spectral or (
-        wavelength.size > 1 and colour.has_colour(wavelength.astype(float))
-    )
-    bands = jnp.asarray(wavelength)
-    weights = colour.response(bands) if seen else None
-    response = None if spectral else space.from_xyz(weights)
-
-    # First what may be refused.
-    sky = made()
-    disks = render_disks(sky, camera, response) if files.sun else np.zeros(1)
-    if files.half and np.max(disks) > _LARGEST_HALF:
-        rule = "cannot hold the sun's disk; leave it to a lamp with --no-sun"
-        refuse("--half", rule, f"{np.max(disks):g}")
-    lamps = [measure_lamp(sky, x, camera, space, weights) for x in sky.lights]
-    look = render if stokes == 1 else render_stokes
+def _seen(
+    sky: AbstractSky, camera: AbstractCamera, response: Response | None, stokes: int
+) -> Seen:
     with progress_bar("sky") as tell:
-        picture = np.asarray(look(sky, camera, response, progress=tell))
-    polarised = None
-    if stokes == 3:
-        picture, polarised = picture[0], picture[1:]
-    picture = picture + disks.astype(picture.dtype)
-
-    latlong = isinstance(camera, LatLong)
-    kind = {
-        "stokes": polarised,
-        "half": files.half,
-        "latlong": latlong,
-        "attributes": header(wavelength, lamps) | said,
-    }
-    if spectral:
-        image.write_spectral_exr(files.output, picture, wavelength, **kind)
-    else:
-        image.write_exr(files.output, picture, space, **kind)
-    for lamp in lamps:
-        print(lamp)
-    size = f"{camera.width} x {camera.height}"
-    print(f"wrote {files.output}: {size}, {files.colour_space}")
-    if preview is not None and seen:
-        xyz = jnp.asarray(picture)
-        xyz = colour.to_xyz(xyz, bands) if spectral else space.to_xyz(xyz)
-        exposure = files.exposure
-        if exposure is None:
-            exposure = round(float(colour.automatic_exposure(xyz)), 2)
-        note = {"exposure": f"EV {exposure:g} at ISO 100"}
-        image.write_png(preview, colour.preview(xyz, exposure), note)
-        print(f"wrote {preview}: exposure EV {exposure:g}")
+        if stokes == 1:
+            return Seen(np.asarray(render(sky, camera, response, progress=tell)))
+        picture = np.asarray(render_stokes(sky, camera, response, progress=tell))
+        return Seen(picture[0], stokes=picture[1:])

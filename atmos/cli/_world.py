@@ -17,8 +17,10 @@ from ..scene import earth, mars, Scene
 from ..scenefile import load, opac
 from ..solver import (
     AbstractSolver,
+    AbstractTracing,
     Columns,
     Fixed,
+    PathTracing,
     QUICK,
     RayMarching,
     ShadowCache,
@@ -27,6 +29,7 @@ from ..solver import (
     SingleScattering,
     solve,
     SolvedSky,
+    VolumeTracing,
 )
 from ..spectrum import AbstractSpectrum, Constant
 from ._app import refuse
@@ -137,6 +140,18 @@ def solver_named(
             refuse("--stokes", "must be 1 with --solver march", stokes)
         return RayMarching(Fixed(256), ShadowCache(96))
     return dataclasses.replace(single, stokes=stokes)
+
+
+# The paths of a look: some after another, so that fewer wait for the longest.
+_WALKS, _PATHS = 2, 8
+EACH = _WALKS * _PATHS
+
+
+def tracer(scene: Scene) -> AbstractTracing:
+    """The solver that traces paths through a scene: layers have one of their own."""
+    if all(x.profile.layered and x.emission is None for x in scene.media):
+        return PathTracing(walks=_WALKS, paths=_PATHS)
+    return VolumeTracing(walks=_WALKS, paths=_PATHS, cells=32)
 
 
 def solve_file(

@@ -16,6 +16,7 @@ from .height_fog import HeightFog as HeightFog
 from .noise import Noise as Noise
 from .product import Product as Product
 from .puff import Puff as Puff
+from .sampled import sampled as sampled
 from .standard_atmosphere import (
     SEA_LEVEL as SEA_LEVEL,
     StandardAtmosphere as StandardAtmosphere,

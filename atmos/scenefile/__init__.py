@@ -5,6 +5,11 @@ tables may hold is what the classes here say; their words, and what they mean, a
 of `atmos.medium`, `atmos.phase` and `atmos.spectrum`.
 """
 
-from ._read import load as load, parse as parse
+from ._read import (
+    load as load,
+    load_camera as load_camera,
+    parse as parse,
+    parse_camera as parse_camera,
+)
 from ._scene import opac as opac
 from ._write import dump as dump, GUIDE as GUIDE

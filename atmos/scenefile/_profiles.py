@@ -8,9 +8,10 @@ from contextvars import ContextVar
 from typing import Annotated
 
 import msgspec
+import numpy as np
 
 from .. import gridfile, medium
-from ._base import Above0, AtLeast0, Kind
+from ._base import Above0, AtLeast0, build, Kind
 from ._errors import under
 
 
@@ -18,6 +19,7 @@ from ._errors import under
 FOLDER: ContextVar[str] = ContextVar("FOLDER", default=".")
 Place = tuple[float, float, float]
 Octaves = Annotated[int, msgspec.Meta(ge=1, le=16)]
+Cells = Annotated[int, msgspec.Meta(ge=1, le=1024)]
 Seed = Annotated[int, msgspec.Meta(ge=0, lt=2**31)]
 
 
@@ -139,6 +141,19 @@ class Transformed(Kind, tag="transformed"):
     offset: Place = (0.0, 0.0, 0.0)
 
 
+class Sampled(Kind, tag="sampled"):
+    """A grid of what a profile is in the middles of so many cells."""
+
+    of: Profile
+    lower: Place
+    upper: Place
+    cells: tuple[Cells, Cells, Cells]
+
+    def build(self) -> medium.Grid:
+        box = np.array(self.lower), np.array(self.upper)
+        return medium.sampled(build("of", self.of), *box, self.cells)
+
+
 class Product(Kind, tag="product"):
     makes = medium.Product
     one: Profile
@@ -167,5 +182,6 @@ Profile = (
     | Grid
     | File
     | Transformed
+    | Sampled
     | Product
 )

@@ -2,12 +2,14 @@ import contextlib
 import os
 import re
 import tomllib
-from collections.abc import Iterator
-from typing import Any
+from collections.abc import Callable, Iterator
+from typing import Any, TypeVar
 
 import msgspec
 
+from ..camera import AbstractCamera
 from ..scene import Scene
+from ._base import build
 from ._errors import refuse, short
 from ._profiles import FOLDER
 from ._scene import File
@@ -23,14 +25,12 @@ def load(path: str | os.PathLike[str]) -> Scene:
     Raises `ValueError` naming the file, the key, the rule and the value where it is not
     TOML, or not a scene; `OSError` where it cannot be read.
     """
-    with open(path, "rb") as file:
-        raw = file.read()
-    token = FOLDER.set(os.path.dirname(os.fspath(path)) or ".")
-    try:
-        with _of_file(os.fspath(path)):
-            return parse(raw.decode())
-    finally:
-        FOLDER.reset(token)
+    return _loaded(path, parse)
+
+
+def load_camera(path: str | os.PathLike[str]) -> AbstractCamera | None:
+    """The camera of a scene file, if it has one. Errors are those of `load`."""
+    return _loaded(path, parse_camera)
 
 
 def parse(text: str) -> Scene:
@@ -38,6 +38,30 @@ def parse(text: str) -> Scene:
 
     Raises `ValueError` naming the key, the rule and the value.
     """
+    return _tables(text).build()
+
+
+def parse_camera(text: str) -> AbstractCamera | None:
+    """The camera in the text of a scene file, if there is one; errors of `parse`."""
+    found = _tables(text).camera
+    return None if found is None else build("camera", found)
+
+
+Read = TypeVar("Read")
+
+
+def _loaded(path: str | os.PathLike[str], parsed: Callable[[str], Read]) -> Read:
+    with open(path, "rb") as file:
+        raw = file.read()
+    token = FOLDER.set(os.path.dirname(os.fspath(path)) or ".")
+    try:
+        with _of_file(os.fspath(path)):
+            return parsed(raw.decode())
+    finally:
+        FOLDER.reset(token)
+
+
+def _tables(text: str) -> File:
     try:
         raw = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
@@ -46,10 +70,9 @@ def parse(text: str) -> Scene:
         raise ValueError("must be TOML without deep nesting") from error
     _check_finite(raw, "")
     try:
-        tables = msgspec.convert(raw, File)
+        return msgspec.convert(raw, File)
     except msgspec.ValidationError as error:
         raise ValueError(_explained(str(error), raw)) from error
-    return tables.build()
 
 
 @contextlib.contextmanager
@@ -100,6 +123,7 @@ _WORDS = {
     r" \| null": "",
     r" \| ": " or ",
     r"\bfloat\b": "a number",
+    r"\bint\b": "a whole number",
     r"\bstr\b": "a text",
     r"\bobject\b": "a table",
     r"\barray\b": "a list",

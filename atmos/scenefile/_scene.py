@@ -10,6 +10,7 @@ from ..quantity import deg
 from ..rays import direction
 from ..scene import air, haze, ozone, Scene
 from ._base import Above0, AtLeast0, build, Table, within
+from ._cameras import Camera
 from ._errors import refuse, under
 from ._phases import Phase
 from ._profiles import Blackbody, File as GridFile, located, Profile
@@ -162,6 +163,7 @@ class File(Table):
     planet: Planet
     sun: Sun | list[Sun]
     medium: list[Medium] = []
+    camera: Camera | None = None
 
     def build(self) -> Scene:
         suns = {"sun": self.sun}

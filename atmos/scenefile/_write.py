@@ -10,6 +10,7 @@ import msgspec
 import numpy as np
 
 from .. import light, medium, particle, phase, spectrum
+from ..camera import AbstractCamera
 from ..geometry import Flat, Spherical
 from ..particle import ozone, surface
 from ..quantity import deg
@@ -17,6 +18,7 @@ from ..rays import angles, decimals
 from ..reference import solar_irradiance
 from ..scene import Scene
 from ._base import Kind
+from ._cameras import written
 from ._errors import short, under
 from ._phases import Angles
 from ._scene import Medium, Planet, Sun
@@ -53,6 +55,8 @@ GUIDE = """\
 #            { kind = "transformed", of, matrix, offset }: `of` is a profile, `matrix`
 #            has three rows of three numbers
 #            { kind = "product", one, other }: of two profiles, to bound noise by a box
+#            { kind = "sampled", of, lower, upper, cells }: a grid, of so many cells
+#            along x, y and z of a box, of a profile: quicker than noise
 #   phase    { kind = "isotropic" }
 #            { kind = "rayleigh", depolarisation }
 #            { kind = "henyey_greenstein", g }
@@ -74,17 +78,25 @@ GUIDE = """\
 # Colour     A medium with an `extinction` and a profile of kind "file" may have a
 #            `colour`: the name of a grid of red, green and blue in the same file, the
 #            share that scatters.
+# Camera     [camera] says what pictures show, if there is one; options may change it.
+#            { kind = "perspective", position, azimuth, elevation, field_of_view,
+#            height, width }: from side to side, in degrees, and pixels;
+#            { kind = "latlong", position, height, centre_azimuth }: all directions;
+#            { kind = "fisheye", position, height, angle_of_view, top_azimuth }
 # Presets    A medium may be as short as this: preset = "air"; preset = "ozone", with a
 #            `column` in Dobson units; preset = "continental_clean" or another aerosol
 #            (see `atmos sky --help`), with an `optical_depth` or a `visibility`.
 """
 
 
-def dump(scene: Scene, names: Sequence[str] = ()) -> str:
+def dump(
+    scene: Scene, names: Sequence[str] = (), camera: AbstractCamera | None = None
+) -> str:
     """The text of a scene file, of which `parse` makes the same scene.
 
     Numbers have as many digits as their precision holds. `names` are for the media, in
-    order. Raises `ValueError` for what a scene file has no words for.
+    order. `parse_camera` makes the `camera` of it again. Raises `ValueError` for what
+    a scene file has no words for.
     """
     shape = scene.geometry
     if not isinstance(shape, Spherical | Flat):
@@ -100,7 +112,9 @@ def dump(scene: Scene, names: Sequence[str] = ()) -> str:
     for i, x in enumerate(scene.media):
         media.append(_described(f"media[{i}]", x, _medium))
         media[-1].name = names[i] if i < len(names) else None
-    tables = [("planet", planet), *(("sun", x) for x in suns)]
+    tables: list[tuple[str, Any]] = [("planet", planet), *(("sun", x) for x in suns)]
+    if camera is not None:
+        tables.insert(0, ("camera", written(camera)))
     many = [] if len(suns) == 1 else ["sun"]
     text = "" if suns else "sun = []\n\n"
     for name, table in [*tables, *(("medium", x) for x in media)]:

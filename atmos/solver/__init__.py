@@ -20,6 +20,7 @@ from ._tally import (
     AbstractTracing as AbstractTracing,
     Estimate as Estimate,
     estimate as estimate,
+    estimates as estimates,
     Tally as Tally,
 )
 from .columns import Columns as Columns

@@ -2,11 +2,12 @@ import abc
 from typing import Any
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Integer, PyTree, Scalar
 
 from ..light import Sun
-from ..quantity import Direction, Number, Position, Radiance, Wavelength
+from ..quantity import Direction, Number, Position, Wavelength
 from ..scene import Scene
 from ._base import AbstractSolver, SolvedSky
 from .single_scattering import SingleScattering
@@ -69,8 +70,8 @@ class AbstractTracing(AbstractSolver):
 class Estimate(eqx.Module):
     """A radiance, and how far it is likely to be off."""
 
-    mean: Radiance
-    standard_error: Radiance
+    mean: Float[Array, "*look wl"]
+    standard_error: Float[Array, "*look wl"]
 
 
 @eqx.filter_jit
@@ -79,10 +80,21 @@ def estimate(sky: SolvedSky, position: Position, direction: Direction) -> Estima
 
     Raises `ValueError` for a sky that is not path traced.
     """
+    found = estimates(sky, position[None], direction[None])
+    return jax.tree.map(lambda x: x[0], found)
+
+
+@eqx.filter_jit
+def estimates(
+    sky: SolvedSky,
+    positions: Float[Array, "look 3"],
+    directions: Float[Array, "look 3"],
+) -> Estimate:
+    """The same of many looks together, which takes less time than one by one."""
     solver = sky.solver
     if not isinstance(solver, AbstractTracing):
         raise ValueError(f"`sky` must be traced by paths; got {type(solver).__name__}.")
-    total = jnp.zeros_like(sky.wavelength)
+    total = jnp.zeros((*positions.shape[:1], *sky.wavelength.shape), directions.dtype)
     mean, variance = total, total
     lights: list[Sun | None] = list(sky.scene.lights)
     if any(x.emission is not None for x in sky.scene.media):
@@ -93,11 +105,11 @@ def estimate(sky: SolvedSky, position: Position, direction: Direction) -> Estima
             sky.scene,
             light,
             sky.wavelength,
-            position[None],
-            direction[None],
+            positions,
+            directions,
         )
-        mean += tally.mean[0]
-        variance += tally.standard_error[0] ** 2
+        mean += tally.mean
+        variance += tally.standard_error**2
     if solver.single is not None:
         once = SolvedSky(
             scene=sky.scene,
@@ -105,5 +117,5 @@ def estimate(sky: SolvedSky, position: Position, direction: Direction) -> Estima
             wavelength=sky.wavelength,
             prepared=None,
         )
-        mean += once.radiance(position, direction)
+        mean += jax.vmap(once.radiance)(positions, directions)
     return Estimate(mean, jnp.sqrt(variance))
