@@ -18,6 +18,7 @@ ROOT = pathlib.Path(atmos.__file__).parent
 ROOMS = [
     "data",
     "quantity",
+    "rotation",
     "polarisation",
     "reference",
     "spectrum",
@@ -50,7 +51,7 @@ ROOMS = [
 KNOWN_BY = {
     "colour": "reference.py",
     "cyclopts": "cli/_app.py",
-    "ephem": "light.py",
+    "ephem": "light/sun.py",
     "msgspec": "scenefile",
     "numcodecs": "gridfile/_stream.py",
     "OpenEXR": "image.py",
