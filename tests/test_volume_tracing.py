@@ -193,12 +193,14 @@ AIM = AIM / np.linalg.norm(AIM, axis=1)[:, None]
 
 
 def test_light_of_dark_smoke_turns_once_and_is_as_it_is_marched_in_any_size():
-    sky = solve(cloud(BOX, 0.02, 2.0, 0.4), RayMarching(), NM)
+    # And with any asymmetry, in smoke and outside.
     look = eqx.filter_jit(jax.vmap(lambda sky, *ray: sky.radiance(*ray), (None, 0, 0)))
-    due = np.asarray(look(sky, jnp.asarray(START), jnp.asarray(AIM)))
-    for size in (1e-3, 1.0, 6.4e6):
+    cases = [(1e-3, 0.4), (1.0, 0.4), (6.4e6, 0.4), (1.0, 0.999), (1.0, -0.999)]
+    for size, g in cases:
+        sky = solve(cloud(BOX, 0.02, 2.0, g), RayMarching(), NM)
+        due = np.asarray(look(sky, jnp.asarray(START), jnp.asarray(AIM)))
         box = Box(LOWER * size, UPPER * size)
-        smoke = cloud(box, 0.02 / size, 2.0 / size, 0.4)
+        smoke = cloud(box, 0.02 / size, 2.0 / size, g)
         mean, error = tallied(smoke, START * size, AIM)
         # A hundredth scatters: of light that turned twice there is so little.
         assert np.all(np.abs(mean - due) <= 4.5 * error + 0.01 * due)

@@ -1,6 +1,7 @@
 import abc
 
 import equinox as eqx
+import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..quantity import (
@@ -10,6 +11,7 @@ from ..quantity import (
     Number,
     Position,
     Radiance,
+    Spectral,
     Wavelength,
 )
 
@@ -51,3 +53,14 @@ class AbstractLight(eqx.Module):
     def backdrop(self) -> bool:
         """Whether it is part of what one sees behind the world; disks are not."""
         return False
+
+
+def from_place(
+    source: Position, position: Position, intensity: Spectral, wavelength: Wavelength
+) -> Shine:
+    """What a place sends to another, by its intensity in W sr^-1 nm^-1."""
+    apart = source - position
+    squared = jnp.maximum(jnp.dot(apart, apart), 1e-30)
+    distance = jnp.sqrt(squared)
+    irradiance = jnp.broadcast_to(intensity / squared, wavelength.shape)
+    return Shine(apart / distance, distance, irradiance, jnp.zeros_like(distance))

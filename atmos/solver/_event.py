@@ -1,19 +1,17 @@
 """One path of light in a world, followed backwards from one event to the next."""
 
 import dataclasses
-import math
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Bool, Float, PRNGKeyArray
+from jaxtyping import Array, Float
 
-from ..geometry import FAR, Point
+from ..geometry import FAR
 from ..light import Shine
-from ..quantity import Direction, Number, versine
-from ..rotation import around
+from ..quantity import Number
 from ..transport import columns
-from ._collision import phase, turn
+from ._bend import Bend, falls, turned
 from ._flight import dot, LIGHT_NODES
 from ._meeting import meet, Meeting
 from ._trip import Leg, Quest, set_out, Trip
@@ -24,6 +22,9 @@ from ._walk import weigh
 _LONG, _STAYS = 1000, 0.99
 # Below this share of what it had, a path or a beam is given up by chance.
 _FAINT = 0.1
+
+# The density, per sr, with which a smooth surface sends light on.
+_SHARP = 1e15
 
 
 def proceed(quest: Quest, trip: Trip) -> Trip:
@@ -37,11 +38,12 @@ def proceed(quest: Quest, trip: Trip) -> Trip:
     arrives = trip.beaming & ~place.met & ~place.leg.blocked
     found += jnp.where(arrives, trip.beam, 0.0)
 
-    bend, passed = _bend(quest, trip, place, path, u[2:6], own)
+    bend, passed = turned(quest, trip, place, path, u[2:6], own)
     weight, ratio = weigh(trip.weight, trip.ratio, passed.seen, passed.chance)
     shine, beam = _light_up(quest, trip, bend, weight, ratio, u[7:])
     beam = jnp.where(bend.turns, beam, _dim(trip, place, u[2]))
-    aim = jnp.where(bend.turns, jnp.mean(ratio * bend.shares), trip.aim)
+    aim = jnp.where(bend.smooth, _SHARP, jnp.mean(ratio * bend.shares))
+    aim = jnp.where(bend.turns, aim, trip.aim)
     after = weigh(weight, ratio, bend.shares, bend.shares)
     onwards = lambda a, b: jnp.where(bend.turns, a, b)
     weight, ratio = map(onwards, after, (weight, ratio))
@@ -66,7 +68,11 @@ def proceed(quest: Quest, trip: Trip) -> Trip:
     start = choose(ended, trip.eye, start)
     towards = jnp.where(sets_out, shine.direction, onward)
     towards = jnp.where(ended, trip.outward, towards)
-    leg = set_out(quest, start, towards, jnp.where(sets_out, shine.distance, FAR))
+    most = jnp.where(sets_out, shine.distance, FAR)
+    leaves = jnp.where(bend.turns & ~place.met, place.leg.surface, -1)
+    leaves = jnp.where(bend.turns, leaves, place.leg.leaves)
+    leaves = jnp.where(ended, -1, leaves)
+    leg = set_out(quest, start, towards, most, leaves)
     beam = jnp.where(sets_out, beam * _clear(quest, leg), beam)
     leg = choose(bend.turns | back | ended, leg, place.leg)
     count = max(quest.wavelength.shape[0], 1)
@@ -104,78 +110,10 @@ def _seen(quest: Quest, trip: Trip, place: Meeting) -> Float[Array, "wl"]:
     )
 
 
-class _Passed(eqx.Module):
-    """What a path takes along from where it came to, and the chance that it did."""
-
-    seen: Float[Array, "wl"]
-    chance: Float[Array, "wl"]
-
-
-class _Bend(eqx.Module):
-    """Where a path turns, if it does, what by, and where to.
-
-    `shares` is how much of the light turns there, per sr.
-    """
-
-    turns: Bool[Array, ""]
-    grounded: Bool[Array, ""]
-    point: Point
-    inward: Direction
-    mixture: Float[Array, "medium wl"]
-    onward: Direction
-    shares: Float[Array, "wl"]
-
-
-def _bend(
-    quest: Quest,
-    trip: Trip,
-    place: Meeting,
-    path: Bool[Array, ""],
-    u: Float[Array, "4"],
-    key: PRNGKeyArray,
-) -> tuple[_Bend, _Passed]:
-    nm, hero, met = quest.wavelength, trip.hero, place.met
-    first = place.airy & (trip.order == 0) & jnp.any(place.scattering > 0.0)
-    real = jnp.where(first, jnp.maximum(place.real, trip.least), place.real)
-    turns = path & met & (u[0] < real[hero])
-    grounded = path & ~met & place.leg.blocked
-    ground = jnp.broadcast_to(quest.scene.ground.evaluate(nm), nm.shape)
-    seen = jnp.where(turns, place.scattering, 1.0 - place.real)
-    seen = jnp.where(met, seen, jnp.where(grounded, ground, 0.0))
-    chance = jnp.where(met, jnp.where(turns, real, 1.0 - real), 1.0)
-
-    point, inward = place.point, place.leg.path.direction
-    altitude = jnp.where(grounded, 0.0, point.altitude)
-    point = Point(point.position, altitude, point.up)
-    apart = turn(quest.scene, nm, place.mixture, hero, u[1], key)
-    apart = jnp.where(grounded, 1.0 - jnp.sqrt(u[2]), apart)
-    axis = jnp.where(grounded, point.up, inward)
-    onward = around(axis, apart, 2.0 * math.pi * u[3])
-    bend = _Bend(
-        turns=turns | grounded,
-        grounded=grounded,
-        point=point,
-        inward=inward,
-        mixture=place.mixture,
-        onward=onward,
-        shares=jnp.ones_like(nm),
-    )
-    shares = _falls(quest, bend, onward)
-    return eqx.tree_at(lambda x: x.shares, bend, shares), _Passed(seen, chance)
-
-
-def _falls(quest: Quest, bend: _Bend, direction: Direction) -> Float[Array, "wl"]:
-    """How much of the light that turns here comes from a direction, per sr."""
-    turned = versine(bend.inward, direction)
-    found = phase(quest.scene, quest.wavelength, bend.mixture, turned)
-    level = jnp.maximum(jnp.dot(bend.point.up, direction), 0.0) / math.pi
-    return jnp.where(bend.grounded, level, found)
-
-
 def _light_up(
     quest: Quest,
     trip: Trip,
-    bend: _Bend,
+    bend: Bend,
     weight: Float[Array, "wl"],
     ratio: Float[Array, "wl"],
     u: Float[Array, "2"],
@@ -187,9 +125,11 @@ def _light_up(
         dark = jnp.zeros_like(nm)
         return Shine(bend.onward, far, dark, jnp.zeros_like(far)), dark
     shine = quest.light.sample(bend.point.position, u, nm)
-    falls = _falls(quest, bend, shine.direction)
-    apt = jnp.mean(ratio * falls) * shine.solid_angle
-    return shine, weight * falls * shine.irradiance / (1.0 + apt)
+    share = falls(quest, bend, shine.direction)
+    apt = jnp.mean(ratio * share) * shine.solid_angle
+    beam = weight * share * shine.irradiance / (1.0 + apt)
+    # What a smooth surface shows is never found on purpose.
+    return shine, jnp.where(bend.smooth, 0.0, beam)
 
 
 def _dim(trip: Trip, place: Meeting, u: Number) -> Float[Array, "wl"]:

@@ -1,5 +1,7 @@
 """What a path meets next: something that may turn it, or nothing."""
 
+import dataclasses
+
 import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
@@ -53,7 +55,7 @@ def meet(quest: Quest, trip: Trip, u: Float[Array, "2"]) -> Meeting:
     mixture = here[:, None] * quest.scattering
     scattering = total(here, quest.scattering)
     return Meeting(
-        leg=Leg(path, at, leg.far, leg.blocked),
+        leg=dataclasses.replace(leg, at=at),
         point=point,
         met=met,
         airy=airy,

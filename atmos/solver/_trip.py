@@ -13,8 +13,8 @@ from ._majorants import Cells
 from ._strata import Strata
 
 
-# Thin air is met so often on the first leg, at least, and turns so often; before ground
-# half as often. What it turns more often than it does weighs less.
+# Thin air is met so often on the first leg, at least, and turns so often; half as often
+# where there is something behind it. What it turns more than it does weighs less.
 _MEETS, _TURNS = 4.0, 2.0
 
 
@@ -39,13 +39,17 @@ class Quest(eqx.Module):
 class Leg(eqx.Module):
     """A straight way through the world, and how far along it one has come.
 
-    It goes to `far`, where it is `blocked` unless it leads out or to a light.
+    It goes to `far`, where it is `blocked` unless it leads out or to a light. The
+    surface that blocks it is counted from 0, as is the one that it `leaves`, if any;
+    the ground is the one after the last.
     """
 
     path: AbstractPath
     at: Length
     far: Length
     blocked: Bool[Array, ""]
+    surface: Integer[Array, ""]
+    leaves: Integer[Array, ""]
 
 
 class Trip(eqx.Module):
@@ -88,16 +92,18 @@ def begin(
     geometry = quest.scene.geometry
     path = geometry.path(geometry.locate(position), direction).enter(quest.scene.top)
     one = jnp.ones_like(quest.wavelength)
-    leg = set_out(quest, path.start, direction, jnp.full_like(path.start.altitude, FAR))
+    far = jnp.full_like(path.start.altitude, FAR)
+    leg = set_out(quest, path.start, direction, far, jnp.int32(-1))
     strata = quest.majorants.strata
     depth = leg.far * 0.0 if strata is None else strata.depth(leg.path, leg.far)
     lift = jnp.maximum(_MEETS / jnp.where(depth > 0.0, depth, _MEETS), 1.0)
+    behind = leg.blocked | (quest.light is not None and quest.light.backdrop)
     count = max(quest.wavelength.shape[0], 1)
     return Trip(
         eye=path.start,
         outward=direction,
         lift=lift,
-        least=jnp.where(leg.blocked, 0.5, 1.0) * _TURNS / (jnp.maximum(depth, _MEETS)),
+        least=jnp.where(behind, 0.5, 1.0) * _TURNS / (jnp.maximum(depth, _MEETS)),
         key=key,
         step=jnp.int32(0),
         left=jnp.int32(paths),
@@ -115,11 +121,24 @@ def begin(
     )
 
 
-def set_out(quest: Quest, start: Point, direction: Direction, most: Length) -> Leg:
-    """A way through the air, no farther than to the ground, or than `most`."""
+def set_out(
+    quest: Quest,
+    start: Point,
+    direction: Direction,
+    most: Length,
+    leaves: Integer[Array, ""],
+) -> Leg:
+    """A way through the air, no farther than to something solid, or than `most`."""
     path = quest.scene.geometry.path(start, direction)
     span = path.span(quest.scene.top)
     # What grazes the top, and by rounding has not entered, is out.
-    far = jnp.where(span.near > 0.0, 0.0, span.far)
-    blocked = span.grounded & (far <= most)
-    return Leg(path, jnp.zeros_like(far), jnp.minimum(far, most), blocked)
+    far, solid = jnp.where(span.near > 0.0, 0.0, span.far), span.grounded
+    surface = jnp.int32(len(quest.scene.surfaces))
+    for i, x in enumerate(quest.scene.surfaces):
+        ahead = x.shape.meet(start.position, direction, leaves == i)
+        nearer = ahead < far
+        surface = jnp.where(nearer, i, surface)
+        far, solid = jnp.where(nearer, ahead, far), solid | nearer
+    blocked = solid & (far <= most)
+    at, far = jnp.zeros_like(far), jnp.minimum(far, most)
+    return Leg(path, at, far, blocked, surface, leaves)

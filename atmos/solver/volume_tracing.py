@@ -39,6 +39,8 @@ class VolumeTracing(AbstractTracing):
 
     around: ClassVar[int] = 17
     shining: ClassVar[bool] = True
+    lamps: ClassVar[bool] = True
+    solid: ClassVar[bool] = True
     key: PRNGKeyArray = eqx.field(default_factory=lambda: jax.random.key(0))
     blocks: int = eqx.field(static=True, default=1)
     walks: int = eqx.field(static=True, default=64)
@@ -85,11 +87,22 @@ class VolumeTracing(AbstractTracing):
         position: Position,
         direction: Direction,
     ) -> Float[Array, "part wl"]:
-        looks = position[None], direction[None]
-        tally = self.tally(prepared, scene, light, wavelength, *looks)
+        seen = self.shone(prepared, scene, light, wavelength, position, direction)
         media = len(scene.scattering_media)
         parts = jnp.zeros((media + 1, *wavelength.shape), wavelength.dtype)
-        return parts.at[-1].set(tally.mean[0])
+        return parts.at[-1].set(seen)
+
+    def shone(
+        self,
+        prepared: Majorants,
+        scene: Scene,
+        light: AbstractLight,
+        wavelength: Wavelength,
+        position: Position,
+        direction: Direction,
+    ) -> Radiance:
+        looks = position[None], direction[None]
+        return self.tally(prepared, scene, light, wavelength, *looks).mean[0]
 
     def emitted(
         self,
