@@ -1,5 +1,7 @@
 """Light of all orders in clouds and fire, judged in standard errors."""
 
+import dataclasses
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -24,7 +26,7 @@ from atmos.phase import HenyeyGreenstein
 from atmos.scene import Scene
 from atmos.solver import estimate, PathTracing, RayMarching, solve, VolumeTracing
 from atmos.solver._majorants import Cells, cross, fly
-from atmos.spectrum import PowerLaw
+from atmos.spectrum import Constant, PowerLaw
 
 
 NM = np.array([450.0, 650.0])
@@ -234,6 +236,37 @@ def test_light_that_is_never_absorbed_comes_to_an_end():
     mean, _ = tallied(cloud(BOX, 500.0, 0.0, 0.0), START[3:], AIM[3:])
     # A white wall, lit from above: no brighter than white in full light.
     assert np.all((mean > 0.0) & (mean < 1.0 / np.pi))
+
+
+def test_gradients_are_those_of_differences():
+    # How dense it is, how white, and how far ahead it scatters; the bounds stay.
+    at = jnp.array([1.0, 0.9, 0.5], jnp.float32)
+    solver = dataclasses.replace(SOLVER, slack=2.0)
+    nm = jnp.asarray(NM, jnp.float32)
+    repeat = LOOKS // len(START)
+    looks = [np.repeat(x, repeat, 0) for x in (START, AIM)]
+    looks[0] = looks[0] * (1.0 + 1e-6 * rng.uniform(-1.0, 1.0, (LOOKS, 1)))
+    looks = [jnp.asarray(x, jnp.float32) for x in looks]
+    sky = solve(cloud(BOX, 0.45, 0.05, 0.5), solver, nm)
+
+    def seen(numbers):
+        dense, albedo, g = numbers
+        parts = [Constant(0.5 * dense * x) for x in (albedo, 1.0 - albedo)]
+        medium = Medium(BOX, *parts, HenyeyGreenstein(Constant(g)))
+        scene = dataclasses.replace(sky.scene, media=(medium,), ground=Constant(0.3))
+        scene = jax.tree.map(lambda x: x.astype(nm.dtype), scene)
+        return solver.tally(sky.prepared, scene, scene.lights[0], nm, *looks).mean
+
+    look = jax.jit(lambda at, ahead: jax.jvp(seen, (at,), (ahead,)))
+    for one, step in zip(jnp.eye(3, dtype=jnp.float32), (0.2, 0.08, 0.1), strict=True):
+        ends = [look(at + sign * step * one, one)[0] for sign in (1.0, -1.0)]
+        both = look(at, one)[1], (ends[0] - ends[1]) / (2.0 * step)
+        found = [np.asarray(x, float).mean(1) for x in both]
+        parts = [x.reshape(-1, repeat) for x in found]
+        mean, due = (x.mean(1) for x in parts)
+        error = [x.std(1, ddof=1) / np.sqrt(repeat) for x in parts]
+        assert np.all(np.abs(mean - due) < 4.0 * np.hypot(*error))
+        assert np.any(np.hypot(*error) < 0.2 * np.abs(due))
 
 
 def test_fire_shines_and_lights_the_smoke_around_it():

@@ -3,7 +3,8 @@
 Paths by null collisions, in bounds of cells and of altitudes, against paths along which
 the optical depth is worked out (`PathTracing`), whose air depends on altitude alone: in
 clear air, and with a deck of cloud that is given as a layer, and as a box so wide that
-nothing is seen of its ends. A z-score is an error in standard errors.
+nothing is seen of its ends. And white boxes in even light, of depths up to 100, which
+must be white. A z-score is an error in standard errors.
 
     python -m validation.world
 """
@@ -17,7 +18,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from atmos.geometry import Flat, Spherical
-from atmos.light import Sun
+from atmos.light import Sun, Surrounding
 from atmos.medium import (
     AbstractProfile,
     Box,
@@ -83,12 +84,32 @@ def claims(arguments: argparse.Namespace) -> Iterator[Claim]:
                 scores.append((found[0] - due[0]) / np.hypot(found[1], due[1]))
                 errors.append(found[1] / found[0])
         yield from judged(f"cloud deck as a {name}", scores, errors)
+    yield from of_furnace()
+
+
+def of_furnace() -> Iterator[Claim]:
+    """White boxes over white ground, in even light: what one sees is 1."""
+    lower, upper = np.array([-1.0, -1.0, 1.0]), np.array([1.0, 1.0, 3.0])
+    light = Surrounding(np.ones((4, 8, 1)), [550.0])
+    scores, errors = [], []
+    for depth in (0.1, 1.0, 10.0, 100.0):
+        for g in (-0.9, 0.0, 0.95):
+            phase = HenyeyGreenstein(g)
+            white = Medium(Box(lower, upper), 0.5 * depth, phase=phase)
+            world = Scene(Flat(), 10.0, (white,), (light,), 1.0)
+            solver = VolumeTracing(jax.random.key(9), walks=8, paths=16, cells=1)
+            # Into it from below, slantwise, and from far above.
+            for view in ((0.5, 20.0, 0.0), (2.0, 75.0, 30.0), (8.0, 175.0, 0.0)):
+                mean, error = look(world, solver, *view)
+                scores.append((mean - 1.0) / error)
+                errors.append(error)
+    yield from judged("white furnace", scores, errors)
 
 
 def judged(name: str, scores: list, errors: list) -> Iterator[Claim]:
     # Wavelengths share their paths: they are one trial.
     scores = np.array(scores)
-    source = f"PathTracing, {len(scores)} looks"
+    source = f"{len(scores)} looks"
     yield Claim(
         f"{name}: largest error in standard errors", source, 4.0, np.max(abs(scores))
     )

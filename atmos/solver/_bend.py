@@ -5,6 +5,7 @@ import math
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+from jax.lax import stop_gradient
 from jaxtyping import Array, Bool, Float, PRNGKeyArray
 
 from ..geometry import Point
@@ -51,12 +52,13 @@ def turned(
     """Whether a path turns where it has come to, and how, drawn by chance."""
     nm, hero, met = quest.wavelength, trip.hero, place.met
     first = place.airy & (trip.order == 0) & jnp.any(place.scattering > 0.0)
-    real = jnp.where(first, jnp.maximum(place.real, trip.least), place.real)
+    real = stop_gradient(place.real)
+    real = jnp.where(first, jnp.maximum(real, trip.least), real)
     turns = path & met & (u[0] < real[hero])
     solid = path & ~met & place.leg.blocked
     inward = place.leg.path.direction
     apart = turn(quest.scene, nm, place.mixture, hero, u[1], key)
-    onward = around(inward, apart, 2.0 * math.pi * u[3])
+    onward = stop_gradient(around(inward, apart, 2.0 * math.pi * u[3]))
     wall = _wall(quest, place, u[1:])
     bend = Bend(
         turns=turns | solid,
@@ -107,7 +109,7 @@ def _wall(quest: Quest, place: Meeting, u: Float[Array, "3"]) -> Wall:
         wall = Wall(
             point=point,
             normal=jnp.where(behind, -normal, normal),
-            onward=x.material.turn(inward, normal, u),
+            onward=stop_gradient(x.material.turn(inward, normal, u)),
             smooth=jnp.array(x.material.smooth),
             share=jnp.broadcast_to(x.material.share(nm), nm.shape),
         )

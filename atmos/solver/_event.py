@@ -1,10 +1,16 @@
-"""One path of light in a world, followed backwards from one event to the next."""
+"""One path of light in a world, followed backwards from one event to the next.
+
+Of what was drawn by chance there is no gradient, nor of the chance: there is of what is
+found for it. That is unbiased (detached sampling: Zeltner, Speierer, Georgiev and Jakob
+2021).
+"""
 
 import dataclasses
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+from jax.lax import stop_gradient
 from jaxtyping import Array, Float
 
 from ..geometry import FAR
@@ -42,15 +48,15 @@ def proceed(quest: Quest, trip: Trip) -> Trip:
     weight, ratio = weigh(trip.weight, trip.ratio, passed.seen, passed.chance)
     shine, beam = _light_up(quest, trip, bend, weight, ratio, u[7:])
     beam = jnp.where(bend.turns, beam, _dim(trip, place, u[2]))
-    aim = jnp.where(bend.smooth, _SHARP, jnp.mean(ratio * bend.shares))
+    aim = jnp.where(bend.smooth, _SHARP, jnp.mean(ratio * stop_gradient(bend.shares)))
     aim = jnp.where(bend.turns, aim, trip.aim)
-    after = weigh(weight, ratio, bend.shares, bend.shares)
+    after = weigh(weight, ratio, bend.shares, stop_gradient(bend.shares))
     onwards = lambda a, b: jnp.where(bend.turns, a, b)
     weight, ratio = map(onwards, after, (weight, ratio))
 
     # Given up by chance: what is faint, and what has turned very often.
     order = trip.order + bend.turns.astype(jnp.int32)
-    stays = jnp.clip(jnp.mean(weight) / _FAINT, 0.05, 1.0)
+    stays = jnp.clip(jnp.mean(stop_gradient(weight)) / _FAINT, 0.05, 1.0)
     stays = jnp.where(order > _LONG, jnp.minimum(stays, _STAYS), stays)
     stays = jnp.where(bend.turns, stays, 1.0)
     weight = jnp.where(u[6] < stays, weight / stays, 0.0)
@@ -126,7 +132,7 @@ def _light_up(
         return Shine(bend.onward, far, dark, jnp.zeros_like(far)), dark
     shine = quest.light.sample(bend.point.position, u, nm)
     share = falls(quest, bend, shine.direction)
-    apt = jnp.mean(ratio * share) * shine.solid_angle
+    apt = jnp.mean(ratio * stop_gradient(share)) * shine.solid_angle
     beam = weight * share * shine.irradiance / (1.0 + apt)
     # What a smooth surface shows is never found on purpose.
     return shine, jnp.where(bend.smooth, 0.0, beam)

@@ -1,13 +1,15 @@
 import dataclasses
+import math
 from typing import ClassVar
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+from jax.core import Tracer
 from jaxtyping import Array, Float, Integer, PRNGKeyArray, Scalar
 
 from ..light import AbstractLight
-from ..quantity import Direction, Position, Radiance, Wavelength
+from ..quantity import as_float, Direction, Number, Position, Radiance, Wavelength
 from ..scene import Scene
 from ..transport import extinctions
 from ._event import proceed
@@ -35,6 +37,11 @@ class VolumeTracing(AbstractTracing):
     the look. What shines lights all around it. `check` raises `ValueError` for a medium
     that lies in no box and does not depend on altitude alone. Where nothing is absorbed
     a path of more than 1000 turns is ended by chance, one in a hundred at each.
+
+    Gradients of the mean by forward mode (`jax.jvp`, `jax.jacfwd`) are unbiased for how
+    much media scatter, absorb and shine, and where to, and for what the ground and the
+    lights send; not for where an edge lies. They are those of the weights of paths, and
+    need collisions with nothing: bounds `slack` times as high as must be, such as 2.
     """
 
     around: ClassVar[int] = 17
@@ -46,6 +53,7 @@ class VolumeTracing(AbstractTracing):
     walks: int = eqx.field(static=True, default=64)
     paths: int = eqx.field(static=True, default=4)
     cells: int = eqx.field(static=True, default=16)
+    slack: Number = eqx.field(converter=as_float, default=1.0)
     single: SingleScattering | None = eqx.field(init=False, default=None)
     stokes: int = eqx.field(static=True, init=False, default=1)
 
@@ -56,6 +64,11 @@ class VolumeTracing(AbstractTracing):
                 raise ValueError(
                     f"`{name}` must be at least {number}; got {getattr(self, name)}."
                 )
+        if (
+            not isinstance(self.slack, Tracer)
+            and not 1.0 <= float(self.slack) < math.inf
+        ):
+            raise ValueError(f"`slack` must be at least 1; got {self.slack}.")
 
     def check(self, scene: Scene, wavelength: Wavelength) -> Scene:
         for i, x in enumerate(scene.media):
@@ -73,10 +86,13 @@ class VolumeTracing(AbstractTracing):
             tuple(x for x in scene.media if x.profile.layered == layered),
         )
         air, clouds = part(True), part(False)
-        return Majorants(
-            cells_of(clouds, wavelength, self.cells) if clouds.media else None,
-            strata_of(air, wavelength) if air.media else None,
-        )
+        cells = cells_of(clouds, wavelength, self.cells) if clouds.media else None
+        strata = strata_of(air, wavelength) if air.media else None
+        bounds = [x for x in (cells, strata) if x is not None]
+        higher = [x.bounds * self.slack.astype(wavelength.dtype) for x in bounds]
+        found = Majorants(cells, strata)
+        where = lambda x: [y.bounds for y in (x.cells, x.strata) if y is not None]
+        return eqx.tree_at(where, found, higher)
 
     def scattered(
         self,
@@ -134,7 +150,7 @@ class VolumeTracing(AbstractTracing):
         none = jnp.zeros((0, *wavelength.shape), wavelength.dtype)
         quest = Quest(
             scene,
-            prepared,
+            jax.lax.stop_gradient(prepared),
             light,
             wavelength,
             extinctions(scene, wavelength),
