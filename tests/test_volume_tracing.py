@@ -36,7 +36,7 @@ rng = np.random.default_rng(0)
 
 
 LOOKS = 64
-SOLVER = VolumeTracing(walks=8, paths=8)
+SOLVER = VolumeTracing(walks=8, paths=8, turns=1000)
 
 
 def cloud(profile, scattering, absorption, g, sun=SLANT, exponent=0.0):

@@ -24,11 +24,8 @@ from ._trip import Leg, Quest, set_out, Trip
 from ._walk import weigh
 
 
-# From this order on paths are given up by chance even where nothing is absorbed.
-_LONG, _STAYS = 1000, 0.99
 # Below this share of what it had, a path or a beam is given up by chance.
 _FAINT = 0.1
-
 # The density, per sr, with which a smooth surface sends light on.
 _SHARP = 1e15
 
@@ -57,7 +54,8 @@ def proceed(quest: Quest, trip: Trip) -> Trip:
     # Given up by chance: what is faint, and what has turned very often.
     order = trip.order + bend.turns.astype(jnp.int32)
     stays = jnp.clip(jnp.mean(stop_gradient(weight)) / _FAINT, 0.05, 1.0)
-    stays = jnp.where(order > _LONG, jnp.minimum(stays, _STAYS), stays)
+    often = order > quest.turns
+    stays = jnp.where(often, jnp.minimum(stays, 1.0 - 10.0 / quest.turns), stays)
     stays = jnp.where(bend.turns, stays, 1.0)
     weight = jnp.where(u[6] < stays, weight / stays, 0.0)
     weight = jnp.where(trip.beaming, trip.weight, weight)
@@ -147,12 +145,13 @@ def _dim(trip: Trip, place: Meeting, u: Number) -> Float[Array, "wl"]:
 
 
 def _clear(quest: Quest, leg: Leg) -> Float[Array, "wl"]:
-    """What layered air leaves of a beam."""
+    """What layered air leaves of a beam; nothing of one that is blocked."""
+    whole = jnp.where(leg.blocked, 0.0, jnp.ones_like(quest.wavelength))
     layered = [i for i, x in enumerate(quest.scene.media) if x.profile.layered]
     if not layered:
-        return jnp.ones_like(quest.wavelength)
+        return whole
     media = tuple(quest.scene.media[i] for i in layered)
     air = eqx.tree_at(lambda x: x.media, quest.scene, media)
     passed = columns(air, leg.path, leg.far, nodes=LIGHT_NODES)
     depth = dot(passed, quest.extinction[jnp.array(layered)])
-    return jnp.where(leg.blocked, 0.0, jnp.exp(-depth))
+    return whole * jnp.exp(-depth)

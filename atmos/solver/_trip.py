@@ -26,7 +26,10 @@ class Majorants(eqx.Module):
 
 
 class Quest(eqx.Module):
-    """What is looked for: the light of one light, or with None of media that shine."""
+    """What is looked for: the light of one light, or with None of media that shine.
+
+    After so many `turns` paths are given up by chance even where nothing is absorbed.
+    """
 
     scene: Scene
     majorants: Majorants
@@ -34,6 +37,7 @@ class Quest(eqx.Module):
     wavelength: Wavelength
     extinction: Float[Array, "medium wl"]
     scattering: Float[Array, "medium wl"]
+    turns: int = eqx.field(static=True)
 
 
 class Leg(eqx.Module):
