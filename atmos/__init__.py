@@ -20,6 +20,8 @@ from . import (
     sky as sky,
     solver as solver,
     spectrum as spectrum,
+    surface as surface,
+    surroundings as surroundings,
     transport as transport,
 )
 from .disk import render_disks as render_disks

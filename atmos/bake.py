@@ -1,8 +1,8 @@
 """What a solver worked out for a sky, in a file, so that the next one starts at once.
 
 The file is one of `atmos.archive`. It holds the arrays of `SolvedSky.prepared`, each
-named by the way to it, such as `prepared.field.moments`. A bake serves nothing but what it
-was made of, to the last bit: the same solver with all its settings, the same
+named by the way to it, such as `prepared.field.moments`. A bake serves nothing but what
+it was made of, to the last bit: the same solver with all its settings, the same
 wavelengths in the same precision, and the same scene but for what the solver's `baked`
 leaves out.
 """

@@ -4,7 +4,7 @@ import equinox as eqx
 from jaxtyping import ArrayLike
 
 from .geometry import AbstractGeometry, Spherical
-from .light import Sun
+from .light import AbstractLight, Sun
 from .medium import Exponential, Medium, StandardAtmosphere, Tent
 from .particle import Air, CarbonDioxide, Depolarisation, Scattering
 from .particle.aerosol import Aerosol, martian_dust, martian_dust_phase, opac
@@ -13,20 +13,27 @@ from .particle.surface import albedo
 from .phase import HenyeyGreenstein, Rayleigh
 from .quantity import as_float, km, Length
 from .spectrum import AbstractSpectrum, as_spectrum, Constant, Product
+from .surface import Surface
 
 
 class Scene(eqx.Module):
     """A world: its shape, the top of its air, what is in it, and what shines on it.
 
     `ground` is the albedo of a Lambertian ground. Nothing lies above `top`, in m:
-    profiles are cut there, not renormalised.
+    profiles are cut there, not renormalised. `surfaces` are what else is solid.
     """
 
     geometry: AbstractGeometry
     top: Length = eqx.field(converter=as_float)
     media: tuple[Medium, ...]
-    lights: tuple[Sun, ...]
+    lights: tuple[AbstractLight, ...]
     ground: AbstractSpectrum = eqx.field(converter=as_spectrum, default=0.0)
+    surfaces: tuple[Surface, ...] = ()
+
+    @property
+    def suns(self) -> tuple[Sun, ...]:
+        """The lights that are suns."""
+        return tuple(x for x in self.lights if isinstance(x, Sun))
 
     @property
     def scattering_media(self) -> tuple[Medium, ...]:

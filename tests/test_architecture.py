@@ -18,6 +18,7 @@ ROOT = pathlib.Path(atmos.__file__).parent
 ROOMS = [
     "data",
     "quantity",
+    "rotation",
     "polarisation",
     "reference",
     "spectrum",
@@ -27,6 +28,7 @@ ROOMS = [
     "medium",
     "gridfile",
     "light",
+    "surface",
     "scene",
     "transport",
     "optics",
@@ -39,6 +41,7 @@ ROOMS = [
     "comparison",
     "render",
     "disk",
+    "surroundings",
     "rays",
     "scenefile",
     "archive",
@@ -54,7 +57,7 @@ ROOMS = [
 KNOWN_BY = {
     "colour": "reference.py",
     "cyclopts": "cli/_app.py",
-    "ephem": "light.py",
+    "ephem": "light/sun.py",
     "msgspec": "scenefile",
     "numcodecs": "gridfile/_stream.py",
     "OpenEXR": "image.py",

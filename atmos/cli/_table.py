@@ -79,9 +79,9 @@ def radiance(
     start(float64)
 
     found = load(scene)
-    if len(found.lights) != 1:
+    if len(found.suns) != 1:
         refuse("sun", "must be one alone", f"{len(found.lights)} in '{scene}'")
-    own, towards = angles(np.asarray(found.lights[0].direction))
+    own, towards = angles(np.asarray(found.suns[0].direction))
     suns = (own,) if sun_zenith is None else sun_zenith
     method = solver_named(solver, stokes)
     each = bool(method.baked(found).lights)  # solved for each sun

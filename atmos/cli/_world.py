@@ -50,9 +50,9 @@ def make_scene(
         found = load(path)
         if where is None:
             return found
-        if len(found.lights) != 1:
+        if len(found.suns) != 1:
             refuse("sun", "must be one alone to be moved", len(found.lights))
-        towards = direction(*where[:2]).astype(found.lights[0].direction.dtype)
+        towards = direction(*where[:2]).astype(found.suns[0].direction.dtype)
         return eqx.tree_at(lambda x: x.lights[0].direction, found, towards)
     zenith, azimuth, distance = where or (75.0, 40.0, 1.0)
     if world.world == "mars":

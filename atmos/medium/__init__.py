@@ -1,6 +1,7 @@
 from ._base import (
     AbstractLocal as AbstractLocal,
     AbstractProfile as AbstractProfile,
+    check_above_zero as check_above_zero,
     Medium as Medium,
     of_extinction as of_extinction,
 )

@@ -10,7 +10,7 @@ from jaxtyping import Array, ArrayLike, Float
 
 from ..geometry import AbstractPath, Point
 from ..phase import AbstractPhaseFunction, Isotropic
-from ..quantity import Number, Position, Spectral, Wavelength
+from ..quantity import Length, Number, Position, Spectral, Wavelength
 from ..spectrum import AbstractSpectrum, as_spectrum, Complement, Product
 from ._emission import AbstractEmission
 
@@ -25,7 +25,10 @@ class AbstractProfile(eqx.Module):
     @property
     @abc.abstractmethod
     def levels(self) -> Float[Array, "n"]:
-        """The altitudes, rising, at which the density is not smooth; empty if none."""
+        """The altitudes, rising, at which the density is not smooth; empty if none.
+
+        One that depends on altitude alone rises or falls throughout between two.
+        """
 
     @abc.abstractmethod
     def breaks(self, path: AbstractPath) -> Float[Array, "n"]:
@@ -51,6 +54,19 @@ class AbstractProfile(eqx.Module):
     def most(self, lower: Position, upper: Position) -> Number:
         """What the density does not exceed anywhere in a box above the ground."""
         return jnp.ones_like(lower[0])
+
+    def most_between(self, low: Length, high: Length) -> Number:
+        """What it does not exceed between two altitudes, if it depends on them alone.
+
+        As of a density without jumps; profiles that have some know better.
+        """
+        edges = jnp.stack([low, high])
+        inside = jnp.clip(self.levels.astype(low.dtype), low, high)
+        places = jnp.concatenate([edges, inside])
+        zero = jnp.zeros_like(low)
+        up = jnp.stack([zero, zero, zero + 1.0])
+        look = lambda h: self.density(Point(h * up, h, up))
+        return jnp.max(jax.vmap(look)(places))
 
 
 class AbstractLocal(AbstractProfile):

@@ -2,7 +2,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..geometry import AbstractPath, Point
-from ..quantity import Number, Position
+from ..quantity import Length, Number, Position
 from ._base import AbstractProfile
 
 
@@ -27,6 +27,9 @@ class Product(AbstractProfile):
 
     def most(self, lower: Position, upper: Position) -> Number:
         return self.one.most(lower, upper) * self.other.most(lower, upper)
+
+    def most_between(self, low: Length, high: Length) -> Number:
+        return self.one.most_between(low, high) * self.other.most_between(low, high)
 
     @property
     def layered(self) -> bool:

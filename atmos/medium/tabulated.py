@@ -3,7 +3,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..geometry import AbstractPath, Point
-from ..quantity import as_float, Number, Position
+from ..quantity import as_float, Length, Number, Position
 from ..spectrum import check_table
 from ._base import AbstractProfile, check_not_negative, crossings
 
@@ -33,3 +33,10 @@ class Tabulated(AbstractProfile):
 
     def breaks(self, path: AbstractPath) -> Float[Array, "n"]:
         return crossings(path, self.levels)
+
+    def most_between(self, low: Length, high: Length) -> Number:
+        # What lies at an edge alone is not between.
+        meets = (low < self.knots[-1]) & (high > self.knots[0])
+        inside = jnp.clip(self.knots, jnp.maximum(low, self.knots[0]), high)
+        most = jnp.max(jnp.interp(inside, self.knots, self.values))
+        return jnp.where(meets, most, 0.0)

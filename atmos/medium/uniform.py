@@ -26,3 +26,7 @@ class Uniform(AbstractProfile):
 
     def breaks(self, path: AbstractPath) -> Float[Array, "n"]:
         return crossings(path, self.levels)
+
+    def most_between(self, low: Length, high: Length) -> Number:
+        meets = (low < self.top) & (high > self.bottom)
+        return jnp.where(meets, jnp.ones_like(low), 0.0)

@@ -10,7 +10,7 @@ import numpy as np
 from jax.core import Tracer
 from jaxtyping import Array, ArrayLike, Float, PyTree
 
-from ..light import Sun
+from ..light import AbstractLight, Sun
 from ..phase import Isotropic
 from ..polarisation import vibration
 from ..quantity import (
@@ -37,11 +37,14 @@ class AbstractSolver(eqx.Module):
 
     By day, what it finds varies little between `around` azimuths on half a circle. It
     is radiance alone where `stokes` is 1, and I, Q and U where that is 3. What media
-    shine of themselves is found where `shining`; elsewhere such media are refused.
+    shine of themselves is found where `shining`; elsewhere such media are refused, as
+    are lights other than suns but for `lamps`, and surfaces but where `solid`.
     """
 
     around: ClassVar[int]
     shining: ClassVar[bool] = False
+    lamps: ClassVar[bool] = False
+    solid: ClassVar[bool] = False
     stokes: eqx.AbstractVar[int]
 
     def check(self, scene: Scene, wavelength: Wavelength) -> Scene:
@@ -117,6 +120,18 @@ class AbstractSolver(eqx.Module):
         """What one sees of media that shine of themselves."""
         return jnp.zeros_like(wavelength)
 
+    def shone(
+        self,
+        prepared: PyTree[Any],
+        scene: Scene,
+        light: AbstractLight,
+        wavelength: Wavelength,
+        position: Position,
+        direction: Direction,
+    ) -> Radiance:
+        """What one sees by a light that is no sun."""
+        return jnp.zeros_like(wavelength)
+
 
 def check_stokes(stokes: int) -> None:
     """Raises `ValueError` for a number of Stokes parameters that is not 1 or 3."""
@@ -134,8 +149,9 @@ class SolvedSky(AbstractSky):
 
     @property
     def has_panorama(self) -> bool:
-        media = self.scene.media
-        return all(x.profile.layered and x.emission is None for x in media)
+        scene = self.scene
+        alike = all(x.profile.layered and x.emission is None for x in scene.media)
+        return alike and not scene.surfaces and len(scene.suns) == len(scene.lights)
 
     def radiance(self, position: Position, direction: Direction) -> Radiance:
         total = jnp.zeros_like(self.wavelength)
@@ -144,6 +160,10 @@ class SolvedSky(AbstractSky):
                 self.prepared, self.scene, self.wavelength, position, direction
             )
         for light in self.scene.lights:
+            if not isinstance(light, Sun):
+                world = self.prepared, self.scene, light, self.wavelength
+                total += self.solver.shone(*world, position, direction)
+                continue
             parts = self._parts(light, position, direction)
             turned = versine(direction, light.direction)
             media = self.scene.scattering_media
@@ -165,7 +185,7 @@ class SolvedSky(AbstractSky):
             )
         up = self.scene.geometry.locate(position).up
         total = jnp.zeros((3, *self.wavelength.shape), self.wavelength.dtype)
-        for light in self.scene.lights:
+        for light in self.scene.suns:
             parts = self._parts(light, position, direction)
             turned = versine(direction, light.direction)
             q, u = vibration(up, direction, light.direction)
@@ -188,13 +208,13 @@ class SolvedSky(AbstractSky):
                 f"`position` must lie straight above the origin; got {position}."
             )
         dip, _ = self._edges(position[2])
-        lowest = max((_known(x.zenith + dip) for x in self.scene.lights), default=0.0)
+        lowest = max((_known(x.zenith + dip) for x in self.scene.suns), default=0.0)
         size = fine_enough(_known(position[2]), lowest, self.solver.around)
         return _tabulate(self, position, size)
 
     @property
     def lights(self) -> tuple[Sun, ...]:
-        return self.scene.lights
+        return self.scene.suns
 
     def depth(self, position: Position, direction: Direction) -> Depth:
         return optical_depth(self.scene, position, direction, self.wavelength)
@@ -254,7 +274,7 @@ def _tabulate(sky: SolvedSky, position: Position, resolution: Resolution) -> Pan
         found = found.reshape(zenith.size, azimuth.size, *found.shape[4:])
         return found[:rings, :around]
 
-    tables = [table(x) for x in sky.scene.lights]
+    tables = [table(x) for x in sky.scene.suns]
     parts = len(phases) + sky.solver.stokes
     none = jnp.zeros((0, rings, around, parts, sky.wavelength.size), zenith.dtype)
     return Panorama(
@@ -285,7 +305,7 @@ def _frame(
     terms = [x.phase.terms(sky.wavelength) for x in sky.scene.scattering_media]
     phases = [x for mixture in terms for x, _ in mixture]
     phases = [x for x in phases if not isinstance(x, Isotropic)]
-    lights = sky.scene.lights
+    lights = sky.scene.suns
     sides = [[x.zenith for x in lights], [x.azimuth for x in lights]]
     return grid, tuple(phases), jnp.array(sides, dip.dtype), *blocks
 
@@ -367,6 +387,17 @@ def admit(
                 f"`scene.media[{i}].emission` must be None, for this solver; got "
                 f"{type(x.emission).__name__}."
             )
+    for i, x in enumerate(scene.lights):
+        if not (isinstance(x, Sun) or solver.lamps):
+            raise ValueError(
+                f"`scene.lights[{i}]` must be a sun, for this solver; got "
+                f"{type(x).__name__}."
+            )
+    if scene.surfaces and not solver.solid:
+        raise ValueError(
+            f"`scene.surfaces` must be empty, for this solver; got "
+            f"{len(scene.surfaces)}."
+        )
     scene = jax.tree.map(lambda x: x.astype(nm.dtype), scene)
     return solver.check(scene, nm), nm
 

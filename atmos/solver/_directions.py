@@ -1,10 +1,11 @@
-"""Cells that directions are sorted into, and rotations."""
+"""Cells that directions are sorted into."""
 
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Integer
 
 from ..quantity import Direction
+from ..rotation import basis
 
 
 # Rings about the zenith, and parts of the half circle from the sun's azimuth.
@@ -59,13 +60,3 @@ def _axes(up: Direction, sun: Direction) -> tuple[Direction, Direction]:
     level = level / jnp.sqrt(jnp.where(aside, squared, 1.0))
     ahead = jnp.where(aside, level, basis(up)[0])
     return ahead, jnp.cross(up, ahead)
-
-
-def basis(axis: Direction) -> tuple[Direction, Direction]:
-    """Two directions across an axis, and across each other (Duff et al. 2017)."""
-    x, y, z = axis
-    sign = jnp.where(z >= 0.0, 1.0, -1.0)
-    a = -1.0 / (sign + z)
-    b = x * y * a
-    one = jnp.stack([1.0 + sign * x * x * a, sign * b, -sign * x])
-    return one, jnp.stack([b, sign + y * y * a, -y])

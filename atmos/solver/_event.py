@@ -1,151 +1,157 @@
-"""One path of light in any media, followed backwards by null collisions."""
+"""One path of light in a world, followed backwards from one event to the next.
 
-import math
+Of what was drawn by chance there is no gradient, nor of the chance: there is of what is
+found for it. That is unbiased (detached sampling: Zeltner, Speierer, Georgiev and Jakob
+2021).
+"""
 
+import dataclasses
+
+import equinox as eqx
 import jax
 import jax.numpy as jnp
+from jax.lax import stop_gradient
 from jaxtyping import Array, Float
 
-from ..geometry import Point
-from ..quantity import versine
-from ..transport import densities
-from ._collision import phase, turn
-from ._directions import basis
-from ._majorants import Crossing, fly
-from ._ray import total
-from ._trip import Quest, set_out, Trip
+from ..geometry import FAR
+from ..light import Shine
+from ..quantity import Number
+from ..transport import columns
+from ._bend import Bend, falls, turned
+from ._flight import dot, LIGHT_NODES
+from ._meeting import meet, Meeting
+from ._trip import Leg, Quest, set_out, Trip
 from ._walk import weigh
 
 
-# From this order on paths are given up by chance even where nothing is absorbed.
-_LONG, _STAYS = 1000, 0.99
 # Below this share of what it had, a path or a beam is given up by chance.
 _FAINT = 0.1
+# The density, per sr, with which a smooth surface sends light on.
+_SHARP = 1e15
 
 
 def proceed(quest: Quest, trip: Trip) -> Trip:
     """On to the next collision, real or null, to the ground or out."""
-    scene, nm, hero = quest.scene, quest.wavelength, trip.hero
     key, own = jax.random.split(jax.random.fold_in(trip.key, trip.step + 1))
-    u = jax.random.uniform(key, (6,), nm.dtype)
-    ray, bound, met = fly(quest.cells, trip.ray, -jnp.log1p(-u[0]))
-    place = ray.start + ray.at * ray.direction
-    point = scene.geometry.locate(place)
-    here = densities(scene, point)
-    extinction = total(here, quest.extinction)
-    bound = jnp.where(met, bound, 1.0)
-    real = jnp.clip(extinction / bound, 0.0, 1.0)
-
-    # A beam is dimmed by what it meets, and counts where nothing more is met.
-    beam = jnp.where(met, trip.beam * (1.0 - real), trip.beam)
-    faint = jnp.max(beam, initial=0.0) < _FAINT * trip.bright
-    beam = jnp.where(faint, jnp.where(u[1] < 0.5, 2.0 * beam, 0.0), beam)
-    arrives = trip.beaming & ~met & ~trip.grounded
-    found = trip.total + jnp.where(arrives, trip.beam, 0.0)
-
+    u = jax.random.uniform(key, (9,), quest.wavelength.dtype)
+    place = meet(quest, trip, u[:2])
     path = ~trip.beaming & (trip.left > 0)
-    found += jnp.where(path & met, trip.weight * _shines(quest, point, here) / bound, 0)
-    turns = path & met & (u[1] < real[hero])
-    lands = path & ~met & trip.grounded
-    mixture = here[:, None] * quest.scattering
-    scattering = total(here, quest.scattering)
-    mixture = mixture / jnp.where(scattering > 0.0, scattering, 1.0)[None]
-    ground = jnp.broadcast_to(scene.ground.evaluate(nm), nm.shape)
-    seen = jnp.where(turns, scattering / bound, 1.0 - real)
-    seen = jnp.where(met, seen, jnp.where(trip.grounded, ground, 0.0))
-    chance = jnp.where(turns, real, 1.0 - real)
-    weight, ratio = weigh(trip.weight, trip.ratio, seen, jnp.where(met, chance, 1.0))
+    seen = _seen(quest, trip, place)
+    found = trip.total + jnp.where(path, trip.weight * seen, 0.0)
+    arrives = trip.beaming & ~place.met & ~place.leg.blocked
+    found += jnp.where(arrives, trip.beam, 0.0)
 
-    # Where it goes on to, and what comes there from the sun.
-    foot = scene.geometry.path(scene.geometry.locate(ray.start), ray.direction).at(
-        _ground(quest, ray)
-    )
-    lies = jnp.where(lands, foot.position, place)
-    up = foot.up
-    apart = turn(scene, nm, mixture, hero, u[2], own)
-    cosine = jnp.where(lands, jnp.sqrt(u[3]), 1.0 - apart)
-    sine = jnp.where(lands, 1.0 - u[3], apart * (2.0 - apart))
-    axis = jnp.where(lands, up, ray.direction)
-    one, other = basis(axis)
-    angle = 2.0 * math.pi * u[4]
-    across = jnp.cos(angle) * one + jnp.sin(angle) * other
-    onward = cosine * axis + jnp.sqrt(jnp.maximum(sine, 0.0)) * across
-    onward = onward / jnp.sqrt(jnp.sum(onward * onward))
-    shares = phase(scene, nm, mixture, versine(ray.direction, onward))
-    shares = jnp.where(lands, 1.0, shares)
-    bent = turns | lands
-    sun = onward if quest.light is None else quest.light.direction
-    falls = phase(scene, nm, mixture, versine(ray.direction, sun))
-    falls = jnp.where(lands, jnp.maximum(jnp.dot(up, sun), 0.0) / math.pi, falls)
-    beam = jnp.where(bent, weight * falls, jnp.where(trip.beaming, beam, 0.0))
-    after = weigh(weight, ratio, shares, shares)
-    weight, ratio = (
-        jnp.where(bent, a, b) for a, b in zip(after, (weight, ratio), strict=True)
-    )
+    bend, passed = turned(quest, trip, place, path, u[2:6], own)
+    weight, ratio = weigh(trip.weight, trip.ratio, passed.seen, passed.chance)
+    shine, beam = _light_up(quest, trip, bend, weight, ratio, u[7:])
+    beam = jnp.where(bend.turns, beam, _dim(trip, place, u[2]))
+    aim = jnp.where(bend.smooth, _SHARP, jnp.mean(ratio * stop_gradient(bend.shares)))
+    aim = jnp.where(bend.turns, aim, trip.aim)
+    after = weigh(weight, ratio, bend.shares, stop_gradient(bend.shares))
+    onwards = lambda a, b: jnp.where(bend.turns, a, b)
+    weight, ratio = map(onwards, after, (weight, ratio))
 
     # Given up by chance: what is faint, and what has turned very often.
-    order = trip.order + bent.astype(jnp.int32)
-    stays = jnp.clip(jnp.mean(weight) / _FAINT, 0.05, 1.0)
-    stays = jnp.where(order > _LONG, jnp.minimum(stays, _STAYS), stays)
-    stays = jnp.where(bent, stays, 1.0)
-    weight = jnp.where(u[5] < stays, weight / stays, 0.0)
+    order = trip.order + bend.turns.astype(jnp.int32)
+    stays = jnp.clip(jnp.mean(stop_gradient(weight)) / _FAINT, 0.05, 1.0)
+    often = order > quest.turns
+    stays = jnp.where(often, jnp.minimum(stays, 1.0 - 10.0 / quest.turns), stays)
+    stays = jnp.where(bend.turns, stays, 1.0)
+    weight = jnp.where(u[6] < stays, weight / stays, 0.0)
+    weight = jnp.where(trip.beaming, trip.weight, weight)
+    ratio = jnp.where(trip.beaming, trip.ratio, ratio)
 
     # A beam sets out where the path turns; the path sets out where the beam ends.
-    shines = quest.light is not None
-    sets_out = bent & shines & jnp.any(beam > 0.0)
-    back = trip.beaming & (~met | ~jnp.any(beam > 0.0))
-    weight = jnp.where(
-        trip.beaming, trip.weight, jnp.where(path & ~met & ~lands, 0.0, weight)
-    )
-    ratio = jnp.where(trip.beaming, trip.ratio, ratio)
+    sets_out = bend.turns & jnp.any(beam > 0.0)
+    back = trip.beaming & (~place.met | ~jnp.any(beam > 0.0))
     beaming = sets_out | (trip.beaming & ~back)
-    onward = jnp.where(bent, onward, trip.onward)
+    onward = jnp.where(bend.turns, bend.onward, trip.onward)
     ended = ~beaming & ~jnp.any(weight > 0.0)
-    origin = jnp.where(bent, lies, ray.start)
-    towards = jnp.where(sets_out, sun, onward)
-    origin = jnp.where(ended, trip.position, origin)
+    choose = lambda which, x, y: jax.tree.map(lambda a, b: jnp.where(which, a, b), x, y)
+    start = choose(bend.turns, bend.point, place.leg.path.start)
+    start = choose(ended, trip.eye, start)
+    towards = jnp.where(sets_out, shine.direction, onward)
     towards = jnp.where(ended, trip.outward, towards)
-    anew = bent | back | ended
-    fresh, grounded = set_out(quest, origin, towards)
-    choose = lambda x, y: jax.tree.map(lambda a, b: jnp.where(anew, a, b), x, y)
-    one = jnp.ones_like(weight)
-    count = max(nm.shape[0], 1)
-    return Trip(
-        position=trip.position,
-        outward=trip.outward,
-        key=trip.key,
+    most = jnp.where(sets_out, shine.distance, FAR)
+    leaves = jnp.where(bend.turns & ~place.met, place.leg.surface, -1)
+    leaves = jnp.where(bend.turns, leaves, place.leg.leaves)
+    leaves = jnp.where(ended, -1, leaves)
+    leg = set_out(quest, start, towards, most, leaves)
+    beam = jnp.where(sets_out, beam * _clear(quest, leg), beam)
+    leg = choose(bend.turns | back | ended, leg, place.leg)
+    count = max(quest.wavelength.shape[0], 1)
+    return dataclasses.replace(
+        trip,
         step=trip.step + 1,
         left=trip.left - (ended & (trip.left > 0)).astype(jnp.int32),
-        ray=choose(fresh, ray),
-        grounded=jnp.where(anew, grounded, trip.grounded),
+        leg=leg,
         beaming=beaming,
         onward=onward,
+        aim=aim,
         order=jnp.where(ended, 0, order),
-        hero=jnp.where(ended, (hero + 1) % count, hero),
-        weight=jnp.where(ended, one, weight),
-        ratio=jnp.where(ended, one, ratio),
+        hero=jnp.where(ended, (trip.hero + 1) % count, trip.hero),
+        weight=jnp.where(ended, 1.0, weight),
+        ratio=jnp.where(ended, 1.0, ratio),
         beam=beam,
-        bright=jnp.where(bent, jnp.max(beam, initial=0.0), trip.bright),
+        bright=jnp.where(sets_out, jnp.max(beam, initial=0.0), trip.bright),
         total=found,
     )
 
 
-def _ground(quest: Quest, ray: Crossing) -> Float[Array, ""]:
-    """How far the ground or the top of the air is."""
-    geometry = quest.scene.geometry
-    path = geometry.path(geometry.locate(ray.start), ray.direction)
-    return path.span(quest.scene.top).far
-
-
-def _shines(
-    quest: Quest, point: Point, here: Float[Array, "medium"]
-) -> Float[Array, "wl"]:
-    """What a metre adds of itself."""
-    total = jnp.zeros_like(quest.wavelength)
+def _seen(quest: Quest, trip: Trip, place: Meeting) -> Float[Array, "wl"]:
+    """What shines where a path has come to."""
+    leaves = ~place.met & ~place.leg.blocked
+    seen = jnp.where(place.met, place.shining, 0.0)
     if quest.light is None:
-        for density, x in zip(here, quest.scene.media, strict=True):
-            if x.emission is not None:
-                absorption = x.absorption.evaluate(quest.wavelength)
-                found = x.emission.evaluate(point, absorption, quest.wavelength)
-                total += density * found
-    return total
+        return seen
+    ahead = place.leg.path.direction
+    beyond = quest.light.radiance(ahead, quest.wavelength)
+    # What is also looked for by beams counts by its share of the chance to be found.
+    apt = trip.aim * quest.light.solid_angle(ahead)
+    first = 1.0 if quest.light.backdrop else 0.0
+    return jnp.where(
+        leaves, beyond * jnp.where(trip.order == 0, first, apt / (1.0 + apt)), seen
+    )
+
+
+def _light_up(
+    quest: Quest,
+    trip: Trip,
+    bend: Bend,
+    weight: Float[Array, "wl"],
+    ratio: Float[Array, "wl"],
+    u: Float[Array, "2"],
+) -> tuple[Shine, Float[Array, "wl"]]:
+    """Where to look for the light from where a path turns, and what it may add."""
+    nm = quest.wavelength
+    if quest.light is None:
+        far = jnp.full_like(trip.bright, FAR)
+        dark = jnp.zeros_like(nm)
+        return Shine(bend.onward, far, dark, jnp.zeros_like(far)), dark
+    shine = quest.light.sample(bend.point.position, u, nm)
+    share = falls(quest, bend, shine.direction)
+    apt = jnp.mean(ratio * stop_gradient(share)) * shine.solid_angle
+    beam = weight * share * shine.irradiance / (1.0 + apt)
+    # What a smooth surface shows is never found on purpose.
+    return shine, jnp.where(bend.smooth, 0.0, beam)
+
+
+def _dim(trip: Trip, place: Meeting, u: Number) -> Float[Array, "wl"]:
+    """A beam, by what it meets; where it is faint it is given up by chance."""
+    beam = jnp.where(place.met, trip.beam * (1.0 - place.real), trip.beam)
+    faint = jnp.max(beam, initial=0.0) < _FAINT * trip.bright
+    beam = jnp.where(faint, jnp.where(u < 0.5, 2.0 * beam, 0.0), beam)
+    return jnp.where(trip.beaming, beam, 0.0)
+
+
+def _clear(quest: Quest, leg: Leg) -> Float[Array, "wl"]:
+    """What layered air leaves of a beam; nothing of one that is blocked."""
+    whole = jnp.where(leg.blocked, 0.0, jnp.ones_like(quest.wavelength))
+    layered = [i for i, x in enumerate(quest.scene.media) if x.profile.layered]
+    if not layered:
+        return whole
+    media = tuple(quest.scene.media[i] for i in layered)
+    air = eqx.tree_at(lambda x: x.media, quest.scene, media)
+    passed = columns(air, leg.path, leg.far, nodes=LIGHT_NODES)
+    depth = dot(passed, quest.extinction[jnp.array(layered)])
+    return whole * jnp.exp(-depth)

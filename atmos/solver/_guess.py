@@ -22,7 +22,7 @@ _ROUNDS, _LEAST = 4, 0.5
 
 def prepare(scene: Scene, wavelength: Wavelength) -> Layers:
     """Cuts the air into shells, and guesses how bright they are."""
-    tops = _tops(scene)
+    heights = tops(scene)
     scattering = [
         jnp.zeros_like(wavelength)
         if x.scattering is None
@@ -34,9 +34,9 @@ def prepare(scene: Scene, wavelength: Wavelength) -> Layers:
     ]
     forward = [jnp.broadcast_to(x, wavelength.shape) for x in forward]
     none = jnp.zeros((0, *wavelength.shape), wavelength.dtype)
-    dark = jnp.zeros((tops.shape[0] + 1, SUNS, *wavelength.shape), wavelength.dtype)
+    dark = jnp.zeros((heights.shape[0] + 1, SUNS, *wavelength.shape), wavelength.dtype)
     layers = Layers(
-        tops=tops,
+        tops=heights,
         extinction=extinctions(scene, wavelength),
         scattering=jnp.stack(scattering) if scattering else none,
         forward=jnp.stack(forward) if forward else none,
@@ -55,7 +55,7 @@ def _above(scene: Scene, altitude: Length) -> Point:
 
 
 @eqx.filter_jit
-def _tops(scene: Scene) -> Float[Array, "shell"]:
+def tops(scene: Scene) -> Float[Array, "shell"]:
     """Altitudes that share out the air, each of the media, and the height evenly."""
     x = jnp.linspace(0.0, 1.0, 1024, dtype=scene.top.dtype)
     altitudes = scene.top * x * x

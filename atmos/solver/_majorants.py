@@ -1,4 +1,4 @@
-"""What the extinction does not exceed, in cells, and how a ray goes through them."""
+"""What clouds do not exceed, in cells, and how a ray goes through them."""
 
 import equinox as eqx
 import jax
@@ -10,8 +10,8 @@ from ..scene import Scene
 from ..transport import extinctions
 
 
-class Majorants(eqx.Module):
-    """Cells in a box that holds all media: bounds of the extinction, in m^-1.
+class Cells(eqx.Module):
+    """Cells in a box that holds some media: bounds of the extinction, in m^-1.
 
     At all wavelengths alike, as a path serves them all.
     """
@@ -21,16 +21,14 @@ class Majorants(eqx.Module):
     bounds: Float[Array, "nx ny nz"]
 
 
-def majorants(scene: Scene, wavelength: Wavelength, cells: int) -> Majorants:
-    """Bounds on so many cells along each axis of the box of a scene's media."""
+def cells_of(scene: Scene, wavelength: Wavelength, cells: int) -> Cells:
+    """Bounds on so many cells along each axis of the box of media that have one."""
     boxes = [x.profile.box for x in scene.media]
     lower = jnp.min(jnp.stack([x[0] for x in boxes if x is not None]), 0)
     upper = jnp.max(jnp.stack([x[1] for x in boxes if x is not None]), 0)
-    most = jnp.max(extinctions(scene, wavelength), 1)
     # What shines must be met, even if it takes no light away.
     size = jnp.sqrt(jnp.sum((upper - lower) ** 2))
-    shines = jnp.array([x.emission is not None for x in scene.media])
-    most = jnp.where(shines, jnp.maximum(most, 4.0 / size), most)
+    most = at_most(scene, wavelength, 4.0 / size)
     index = jnp.stack(jnp.meshgrid(*[jnp.arange(cells)] * 3, indexing="ij"), -1)
     index = index.reshape(-1, 3)
     step = (upper - lower) / cells
@@ -42,7 +40,16 @@ def majorants(scene: Scene, wavelength: Wavelength, cells: int) -> Majorants:
         return jnp.sum(jnp.stack(found) * most)
 
     bounds = jax.lax.map(bound, index, batch_size=1024)
-    return Majorants(lower, upper, bounds.reshape(cells, cells, cells))
+    return Cells(lower, upper, bounds.reshape(cells, cells, cells))
+
+
+def at_most(
+    scene: Scene, wavelength: Wavelength, least: Number
+) -> Float[Array, "medium"]:
+    """The extinction of each medium, in m^-1; of those that shine `least` or more."""
+    most = jnp.max(extinctions(scene, wavelength), 1, initial=0.0)
+    shines = jnp.array([x.emission is not None for x in scene.media], bool)
+    return jnp.where(shines, jnp.maximum(most, least), most)
 
 
 class Crossing(eqx.Module):
@@ -54,7 +61,7 @@ class Crossing(eqx.Module):
     far: Length
     cell: Integer[Array, "3"]
 
-    def inside(self, cells: Majorants) -> Bool[Array, ""]:
+    def inside(self, cells: Cells) -> Bool[Array, ""]:
         """Whether there is more to come."""
         size = jnp.array(cells.bounds.shape, jnp.int32)
         within = jnp.all((self.cell >= 0) & (self.cell < size))
@@ -62,12 +69,12 @@ class Crossing(eqx.Module):
 
 
 def cross(
-    cells: Majorants, start: Position, direction: Direction, far: Length
+    cells: Cells, start: Position, direction: Direction, near: Length, far: Length
 ) -> Crossing:
-    """The ray from where it enters the box."""
+    """The ray from where it enters the box, or from `near` if it is in it there."""
     slope = _slope(direction)
     ends = jnp.stack([cells.lower - start, cells.upper - start]) / slope[None]
-    enter = jnp.maximum(jnp.max(jnp.min(ends, 0)), 0.0)
+    enter = jnp.maximum(jnp.max(jnp.min(ends, 0)), near)
     leave = jnp.minimum(jnp.min(jnp.max(ends, 0)), far)
     size = jnp.array(cells.bounds.shape, jnp.int32)
     share = (start + enter * direction - cells.lower) / (cells.upper - cells.lower)
@@ -79,7 +86,7 @@ def cross(
 
 
 def fly(
-    cells: Majorants, ray: Crossing, depth: Number
+    cells: Cells, ray: Crossing, depth: Number
 ) -> tuple[Crossing, Number, Bool[Array, ""]]:
     """On to where the bounds have added up to an optical depth, or out.
 

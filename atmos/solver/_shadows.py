@@ -87,12 +87,12 @@ class ShadowCache(AbstractShadows):
 
         tables = [
             jax.lax.map(lambda x, light=light: look(light, x), share, batch_size=4096)
-            for light in scene.lights
+            for light in scene.suns
         ]
         return Cache(
             lower,
             upper,
-            jnp.stack([x.direction for x in scene.lights]),
+            jnp.stack([x.direction for x in scene.suns]),
             jnp.stack([x.reshape(*shape, len(bounded)) for x in tables]),
         )
 

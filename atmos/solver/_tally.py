@@ -1,15 +1,18 @@
 import abc
-from typing import Any
+from collections.abc import Callable
+from typing import Any, TypeVar
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Integer, PyTree, Scalar
 
-from ..light import Sun
+from ..light import AbstractLight
 from ..quantity import Direction, Number, Position, Wavelength
 from ..scene import Scene
 from ._base import AbstractSolver, SolvedSky
+from ._trip import Trip
+from ._walk import Walk
 from .single_scattering import SingleScattering
 
 
@@ -42,6 +45,26 @@ class Tally(eqx.Module):
         return jnp.sqrt(self.squares / (self.count * (self.count - 1.0)))
 
 
+def joined(
+    trials: Callable[[Integer[Array, ""]], Float[Array, "trial look wl"]],
+    first: Integer[Scalar, ""],
+    blocks: Integer[Scalar, ""],
+    dark: Float[Array, "look wl"],
+) -> Tally:
+    """That of so many blocks of trials, from the `first` on."""
+    none = Tally(jnp.zeros_like(dark, shape=()), dark, dark)
+    more = lambda i, tally: tally.join(Tally.of(trials(first + i)))
+    return jax.lax.fori_loop(0, blocks, more, none)
+
+
+Paths = TypeVar("Paths", Trip, Walk)
+
+
+def ended(onwards: Callable[[Paths], Paths], paths: Paths) -> Paths:
+    """Paths, gone on with until none of them is left."""
+    return jax.lax.while_loop(lambda x: jnp.any(x.left > 0), onwards, paths)
+
+
 class AbstractTracing(AbstractSolver):
     """Light by random paths: right on average, with a standard error.
 
@@ -55,7 +78,7 @@ class AbstractTracing(AbstractSolver):
         self,
         prepared: PyTree[Any],
         scene: Scene,
-        light: Sun | None,
+        light: AbstractLight | None,
         wavelength: Wavelength,
         positions: Float[Array, "look 3"],
         directions: Float[Array, "look 3"],
@@ -96,7 +119,7 @@ def estimates(
         raise ValueError(f"`sky` must be traced by paths; got {type(solver).__name__}.")
     total = jnp.zeros((*positions.shape[:1], *sky.wavelength.shape), directions.dtype)
     mean, variance = total, total
-    lights: list[Sun | None] = list(sky.scene.lights)
+    lights: list[AbstractLight | None] = list(sky.scene.lights)
     if any(x.emission is not None for x in sky.scene.media):
         lights.append(None)
     for light in lights:

@@ -76,7 +76,7 @@ class Columns(AbstractDiffuse):
         check_layered(scene)
         if isinstance(scene.geometry, Flat):
             return scene
-        for i, light in enumerate(scene.lights):
+        for i, light in enumerate(scene.suns):
             zenith = light.zenith
             if not isinstance(zenith, Tracer) and zenith > _LOWEST:
                 raise ValueError(
@@ -90,7 +90,7 @@ class Columns(AbstractDiffuse):
         peaks = Peaks.of(scene, wavelength, self.degrees, self.stokes)
         mixed = peaks.without
         cut = layers(scene, mixed.extinction, self.layers)
-        lights = jnp.array([x.zenith for x in scene.lights], wavelength.dtype)
+        lights = jnp.array([x.zenith for x in scene.suns], wavelength.dtype)
         last = 0.5 * jnp.pi + scene.geometry.dip(scene.top, jnp.zeros_like(scene.top))
         flat = isinstance(scene.geometry, Flat)
         suns = FlatSuns(lights) if flat else RoundSuns(lights, last, self.suns)

@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Integer, PRNGKeyArray, Scalar
 
-from ..light import Sun
+from ..light import AbstractLight, Sun
 from ..optics import check_layered
 from ..quantity import Direction, Position, Wavelength
 from ..scene import Scene
@@ -14,7 +14,7 @@ from ..transport import enter, extinctions
 from ._collision import Task
 from ._flight import Layers
 from ._guess import prepare
-from ._tally import AbstractTracing, Tally
+from ._tally import AbstractTracing, ended, joined, Tally
 from ._walk import advance, begin
 from .single_scattering import SingleScattering
 
@@ -77,13 +77,13 @@ class PathTracing(AbstractTracing):
         self,
         prepared: Layers,
         scene: Scene,
-        light: Sun | None,
+        light: AbstractLight | None,
         wavelength: Wavelength,
         positions: Float[Array, "look 3"],
         directions: Float[Array, "look 3"],
         first: Integer[Scalar, ""] | int = 0,
     ) -> Tally:
-        assert light is not None, "what shines was refused"
+        assert isinstance(light, Sun), "all else was refused"
         once = 1 if self.single is None else 2
         task = Task(scene, prepared, light, wavelength, once)
         # Compiled once, for any number of blocks.
@@ -104,17 +104,14 @@ def _tally(
     paths, _, _ = jax.vmap(enter, (None, 0, 0))(task.scene, positions, directions)
     irradiance = task.light.irradiance.evaluate(task.wavelength) / solver.paths
 
-    def block(index, tally):
-        key = jax.random.fold_in(solver.key, first + index)
+    def trials(index):
+        key = jax.random.fold_in(solver.key, index)
         keys = jax.random.split(key, (solver.walks, *positions.shape[:1]))
         by_look = jax.vmap(begin, (None, 0, 0, 0, None))
         by_walk = jax.vmap(by_look, (None, None, None, 0, None))
         walks = by_walk(task, paths.start, directions, keys, solver.paths)
         onwards = jax.vmap(jax.vmap(lambda x: advance(task, x)))
-        left = lambda x: jnp.any(x.left > 0)
-        found = jax.lax.while_loop(left, onwards, walks).total
-        return tally.join(Tally.of(found * irradiance[None, None]))
+        return ended(onwards, walks).total * irradiance[None, None]
 
-    dark = jnp.zeros((*positions.shape[:1], *task.wavelength.shape), directions.dtype)
-    none = Tally(jnp.zeros_like(irradiance, shape=()), dark, dark)
-    return jax.lax.fori_loop(0, blocks, block, none)
+    shape = (*positions.shape[:1], *task.wavelength.shape)
+    return joined(trials, first, blocks, jnp.zeros(shape, directions.dtype))

@@ -1,85 +1,131 @@
 import dataclasses
+import math
 from typing import ClassVar
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+from jax.core import Tracer
 from jaxtyping import Array, Float, Integer, PRNGKeyArray, Scalar
 
-from ..light import Sun
-from ..quantity import Direction, Position, Radiance, Wavelength
+from ..light import AbstractLight
+from ..quantity import as_float, Direction, Number, Position, Radiance, Wavelength
 from ..scene import Scene
 from ..transport import extinctions
 from ._event import proceed
 from ._look import of_look
-from ._majorants import Majorants, majorants
-from ._tally import AbstractTracing, Tally
-from ._trip import begin, Quest
+from ._majorants import cells_of
+from ._strata import strata_of
+from ._tally import AbstractTracing, ended, joined, Tally
+from ._trip import begin, Majorants, Quest
 from .single_scattering import SingleScattering
 
 
 class VolumeTracing(AbstractTracing):
-    """Light that turned any number of times in clouds and fire: right on average.
+    """Light that turned any number of times in a world: right on average.
 
     Random paths are followed backwards, from the eye, from collision to collision; that
     most of them are with nothing makes up for a density that changes from place to
     place (null collisions: Woodcock 1965, Galtier et al. 2013). How many is said by
-    bounds on a grid of `cells` along each axis. There are `blocks` of `walks` times
-    `paths` for each look; walks are independent, and the standard error is taken from
-    how they differ. All is decided by `key` and the look. Suns are points. What shines
-    lights all around it. Every medium must lie in a box: `check` raises `ValueError`
-    otherwise. Where nothing is absorbed a path of more than 1000 turns is ended by
-    chance, one in a hundred at each.
+    bounds: for media in boxes on a grid of `cells` along each axis, for those that
+    depend on altitude alone between altitudes; the nearest collision of either is met.
+    Light is looked for where it comes from, and where it happens to be found, as each
+    is apt to find it (multiple importance sampling: Veach and Guibas 1995).
+
+    There are `blocks` of `walks` times `paths` for each look; walks are independent,
+    and the standard error is taken from how they differ. All is decided by `key` and
+    the look. What shines lights all around it. `check` raises `ValueError` for a medium
+    that lies in no box and does not depend on altitude alone. Where nothing is absorbed
+    a path of more than `turns` turns is ended by chance, ten in `turns` at each: those
+    that go on weigh more, which makes up for it on average, but is rarely seen. White
+    stuff of an optical depth of 100 that scatters to all sides has few such paths.
+
+    Gradients of the mean by forward mode (`jax.jvp`, `jax.jacfwd`) are unbiased for how
+    much media scatter, absorb and shine, and where to, and for what the ground and the
+    lights send; not for where an edge lies. They are those of the weights of paths, and
+    need collisions with nothing: bounds `slack` times as high as must be, such as 2.
     """
 
     around: ClassVar[int] = 17
     shining: ClassVar[bool] = True
+    lamps: ClassVar[bool] = True
+    solid: ClassVar[bool] = True
     key: PRNGKeyArray = eqx.field(default_factory=lambda: jax.random.key(0))
     blocks: int = eqx.field(static=True, default=1)
     walks: int = eqx.field(static=True, default=64)
     paths: int = eqx.field(static=True, default=4)
     cells: int = eqx.field(static=True, default=16)
+    turns: int = eqx.field(static=True, default=10_000)
+    slack: Number = eqx.field(converter=as_float, default=1.0)
     single: SingleScattering | None = eqx.field(init=False, default=None)
     stokes: int = eqx.field(static=True, init=False, default=1)
 
     def __check_init__(self):
-        least = {"blocks": 1, "walks": 2, "paths": 1, "cells": 1}
+        least = {"blocks": 1, "walks": 2, "paths": 1, "cells": 1, "turns": 100}
         for name, number in least.items():
             if getattr(self, name) < number:
                 raise ValueError(
                     f"`{name}` must be at least {number}; got {getattr(self, name)}."
                 )
+        if (
+            not isinstance(self.slack, Tracer)
+            and not 1.0 <= float(self.slack) < math.inf
+        ):
+            raise ValueError(f"`slack` must be at least 1; got {self.slack}.")
 
     def check(self, scene: Scene, wavelength: Wavelength) -> Scene:
         for i, x in enumerate(scene.media):
-            if x.profile.box is None:
+            if x.profile.box is None and not x.profile.layered:
                 raise ValueError(
-                    f"`scene.media[{i}].profile` must lie in a box, for this solver; "
-                    f"got {type(x.profile).__name__}."
+                    f"`scene.media[{i}].profile` must lie in a box or depend on "
+                    f"altitude alone, for this solver; got {type(x.profile).__name__}."
                 )
         return scene
 
-    def prepare(self, scene: Scene, wavelength: Wavelength) -> Majorants | None:
-        return majorants(scene, wavelength, self.cells) if scene.media else None
+    def prepare(self, scene: Scene, wavelength: Wavelength) -> Majorants:
+        part = lambda layered: eqx.tree_at(
+            lambda x: x.media,
+            scene,
+            tuple(x for x in scene.media if x.profile.layered == layered),
+        )
+        air, clouds = part(True), part(False)
+        cells = cells_of(clouds, wavelength, self.cells) if clouds.media else None
+        strata = strata_of(air, wavelength) if air.media else None
+        bounds = [x for x in (cells, strata) if x is not None]
+        higher = [x.bounds * self.slack.astype(wavelength.dtype) for x in bounds]
+        found = Majorants(cells, strata)
+        where = lambda x: [y.bounds for y in (x.cells, x.strata) if y is not None]
+        return eqx.tree_at(where, found, higher)
 
     def scattered(
         self,
-        prepared: Majorants | None,
+        prepared: Majorants,
         scene: Scene,
-        light: Sun,
+        light: AbstractLight,
         wavelength: Wavelength,
         position: Position,
         direction: Direction,
     ) -> Float[Array, "part wl"]:
-        looks = position[None], direction[None]
-        tally = self.tally(prepared, scene, light, wavelength, *looks)
+        seen = self.shone(prepared, scene, light, wavelength, position, direction)
         media = len(scene.scattering_media)
         parts = jnp.zeros((media + 1, *wavelength.shape), wavelength.dtype)
-        return parts.at[-1].set(tally.mean[0])
+        return parts.at[-1].set(seen)
+
+    def shone(
+        self,
+        prepared: Majorants,
+        scene: Scene,
+        light: AbstractLight,
+        wavelength: Wavelength,
+        position: Position,
+        direction: Direction,
+    ) -> Radiance:
+        looks = position[None], direction[None]
+        return self.tally(prepared, scene, light, wavelength, *looks).mean[0]
 
     def emitted(
         self,
-        prepared: Majorants | None,
+        prepared: Majorants,
         scene: Scene,
         wavelength: Wavelength,
         position: Position,
@@ -90,29 +136,29 @@ class VolumeTracing(AbstractTracing):
 
     def tally(
         self,
-        prepared: Majorants | None,
+        prepared: Majorants,
         scene: Scene,
-        light: Sun | None,
+        light: AbstractLight | None,
         wavelength: Wavelength,
         positions: Float[Array, "look 3"],
         directions: Float[Array, "look 3"],
         first: Integer[Scalar, ""] | int = 0,
     ) -> Tally:
-        if prepared is None:
-            raise ValueError("`scene.media` must be one or more, for this solver.")
         scattering = [
             jnp.zeros_like(wavelength)
             if x.scattering is None
             else jnp.broadcast_to(x.scattering.evaluate(wavelength), wavelength.shape)
             for x in scene.media
         ]
+        none = jnp.zeros((0, *wavelength.shape), wavelength.dtype)
         quest = Quest(
             scene,
-            prepared,
+            jax.lax.stop_gradient(prepared),
             light,
             wavelength,
             extinctions(scene, wavelength),
-            jnp.stack(scattering),
+            jnp.stack(scattering) if scattering else none,
+            self.turns,
         )
         # Compiled once, for any number of blocks.
         alike = dataclasses.replace(self, blocks=1)
@@ -129,23 +175,17 @@ def _tally(
     first: Integer[Scalar, ""],
     blocks: Integer[Scalar, ""],
 ) -> Tally:
-    share = jnp.ones_like(quest.wavelength) / solver.paths
-    if quest.light is not None:
-        share = share * quest.light.irradiance.evaluate(quest.wavelength)
     own = jax.vmap(lambda *look: of_look(solver.key, *look))(positions, directions)
 
-    def block(index, tally):
-        keys = jax.vmap(lambda key: jax.random.fold_in(key, first + index))(own)
+    def trials(index):
+        keys = jax.vmap(lambda key: jax.random.fold_in(key, index))(own)
         keys = jax.vmap(lambda key: jax.random.split(key, solver.walks))(keys)
         by_walk = jax.vmap(begin, (None, None, None, 0, None))
         by_look = jax.vmap(by_walk, (None, 0, 0, 0, None))
         trips = by_look(quest, positions, directions, keys, solver.paths)
         onwards = jax.vmap(jax.vmap(lambda x: proceed(quest, x)))
-        left = lambda x: jnp.any(x.left > 0)
-        found = jax.lax.while_loop(left, onwards, trips).total
-        return tally.join(Tally.of(jnp.swapaxes(found, 0, 1) * share[None, None]))
+        found = ended(onwards, trips).total
+        return jnp.swapaxes(found, 0, 1) / solver.paths
 
     shape = (*positions.shape[:1], *quest.wavelength.shape)
-    dark = jnp.zeros(shape, directions.dtype)
-    none = Tally(jnp.zeros_like(share, shape=()), dark, dark)
-    return jax.lax.fori_loop(0, blocks, block, none)
+    return joined(trials, first, blocks, jnp.zeros(shape, directions.dtype))

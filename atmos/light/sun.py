@@ -1,5 +1,3 @@
-"""What shines on the world from outside."""
-
 import datetime
 import math
 
@@ -7,18 +5,24 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
-from .quantity import (
+from ..geometry import FAR
+from ..quantity import (
     Angle,
     as_float,
     deg,
     Direction,
+    Irradiance,
     Number,
+    Position,
     Radiance,
+    Versine,
     versine,
     Wavelength,
 )
-from .reference import solar_irradiance
-from .spectrum import AbstractSpectrum, as_spectrum, BandAverage
+from ..reference import solar_irradiance
+from ..rotation import around
+from ..spectrum import AbstractSpectrum, as_spectrum, BandAverage
+from ._base import AbstractLight, Shine
 
 
 SOLAR_RADIUS = 0.26656 * deg  # 959.63 arcseconds, seen from 1 astronomical unit
@@ -48,7 +52,7 @@ _LIMB = [
 ]
 
 
-class Sun(eqx.Module):
+class Sun(AbstractLight):
     """A disk at infinity, darker towards its limb, the more so the shorter the wave.
 
     `irradiance` is that of a plane that faces it outside the air, in W m^-2 nm^-1. With
@@ -102,18 +106,42 @@ class Sun(eqx.Module):
         east, north = self.horizontal
         return jnp.arctan2(east, north)
 
+    def sample(
+        self, position: Position, u: Float[Array, "2"], wavelength: Wavelength
+    ) -> Shine:
+        # Seen on the sphere, rings of the disk have areas in proportion to the versine.
+        apart = self._widest * u[0]
+        return Shine(
+            direction=around(self.direction, apart, 2.0 * math.pi * u[1]),
+            distance=jnp.full_like(apart, FAR),
+            irradiance=self._brightness(u[0], wavelength),
+            solid_angle=2.0 * math.pi * self._widest,
+        )
+
     def radiance(self, direction: Direction, wavelength: Wavelength) -> Radiance:
         """The brightness of the disk in a direction, outside the air; 0 beside it."""
-        # Seen on the sphere, rings of the disk have areas in proportion to the versine.
-        widest = 2.0 * jnp.sin(0.5 * self.angular_radius) ** 2
-        share = versine(direction, self.direction) / jnp.maximum(widest, _TINY)
-        inside = share < 1.0
-        cosine = jnp.sqrt(jnp.where(inside, 1.0 - share, 1.0))
+        widest = jnp.maximum(self._widest, _TINY)
+        share = versine(direction, self.direction) / widest
+        even = self._brightness(jnp.minimum(share, 1.0), wavelength)
+        return jnp.where(share < 1.0, even / (2.0 * math.pi * widest), 0.0)
+
+    def solid_angle(self, direction: Direction) -> Number:
+        return 2.0 * math.pi * self._widest
+
+    @property
+    def _widest(self) -> Versine:
+        return 2.0 * jnp.sin(0.5 * self.angular_radius) ** 2
+
+    def _brightness(self, share: Number, wavelength: Wavelength) -> Irradiance:
+        """What it would shine if all were as bright as it is where a share of the disk
+        lies nearer to its middle."""
+        squared = 1.0 - share
+        inside = squared > 0.0
+        cosine = jnp.where(inside, jnp.sqrt(jnp.where(inside, squared, 1.0)), 0.0)
         coefficients = limb_darkening(wavelength)
         powers = jnp.stack([cosine**k for k in range(6)])[:, None]
-        even = self.irradiance.evaluate(wavelength) / (2.0 * math.pi * widest)
         shape = jnp.sum(coefficients * powers, 0) / _mean(coefficients)
-        return jnp.where(inside, even * shape, 0.0)
+        return self.irradiance.evaluate(wavelength) * shape
 
     def slice(self, height: Number, wavelength: Wavelength) -> Float[Array, "wl"]:
         """The share of the irradiance that comes from a strip across the disk.

@@ -1,0 +1,126 @@
+"""Where a path turns: by media, on the ground, or on a surface."""
+
+import math
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jax.lax import stop_gradient
+from jaxtyping import Array, Bool, Float, PRNGKeyArray
+
+from ..geometry import Point
+from ..quantity import Direction, versine
+from ..rotation import around
+from ._collision import phase, turn
+from ._meeting import Meeting
+from ._trip import Quest, Trip
+
+
+class Passed(eqx.Module):
+    """What a path takes along from where it came to, and the chance that it did."""
+
+    seen: Float[Array, "wl"]
+    chance: Float[Array, "wl"]
+
+
+class Bend(eqx.Module):
+    """Where a path turns, if it does, what by, and where to.
+
+    At something solid, `normal` stands on the side that light falls on. `shares` is how
+    much of the light turns there, per sr.
+    """
+
+    turns: Bool[Array, ""]
+    solid: Bool[Array, ""]
+    smooth: Bool[Array, ""]
+    point: Point
+    inward: Direction
+    normal: Direction
+    mixture: Float[Array, "medium wl"]
+    onward: Direction
+    shares: Float[Array, "wl"]
+
+
+def turned(
+    quest: Quest,
+    trip: Trip,
+    place: Meeting,
+    path: Bool[Array, ""],
+    u: Float[Array, "4"],
+    key: PRNGKeyArray,
+) -> tuple[Bend, Passed]:
+    """Whether a path turns where it has come to, and how, drawn by chance."""
+    nm, hero, met = quest.wavelength, trip.hero, place.met
+    first = place.airy & (trip.order == 0) & jnp.any(place.scattering > 0.0)
+    real = stop_gradient(place.real)
+    real = jnp.where(first, jnp.maximum(real, trip.least), real)
+    turns = path & met & (u[0] < real[hero])
+    solid = path & ~met & place.leg.blocked
+    inward = place.leg.path.direction
+    apart = turn(quest.scene, nm, place.mixture, hero, u[1], key)
+    onward = stop_gradient(around(inward, apart, 2.0 * math.pi * u[3]))
+    wall = _wall(quest, place, u[1:])
+    bend = Bend(
+        turns=turns | solid,
+        solid=solid,
+        smooth=solid & wall.smooth,
+        point=jax.tree.map(
+            lambda a, b: jnp.where(solid, a, b), wall.point, place.point
+        ),
+        inward=inward,
+        normal=wall.normal,
+        mixture=place.mixture,
+        onward=jnp.where(solid, wall.onward, onward),
+        shares=jnp.ones_like(nm),
+    )
+    shares = jnp.where(bend.smooth, 1.0, falls(quest, bend, bend.onward))
+    seen = jnp.where(turns, place.scattering, 1.0 - place.real)
+    passed = Passed(
+        seen=jnp.where(met, seen, jnp.where(solid, wall.share, 0.0)),
+        chance=jnp.where(met, jnp.where(turns, real, 1.0 - real), 1.0),
+    )
+    return eqx.tree_at(lambda x: x.shares, bend, shares), passed
+
+
+class Wall(eqx.Module):
+    """Something solid that a way ends on: what share it sends on, and where to."""
+
+    point: Point
+    normal: Direction
+    onward: Direction
+    smooth: Bool[Array, ""]
+    share: Float[Array, "wl"]
+
+
+def _wall(quest: Quest, place: Meeting, u: Float[Array, "3"]) -> Wall:
+    scene, nm, point = quest.scene, quest.wavelength, place.point
+    ground = point.up
+    found = Wall(
+        point=Point(point.position, jnp.zeros_like(point.altitude), ground),
+        normal=ground,
+        onward=around(ground, 1.0 - jnp.sqrt(u[1]), 2.0 * math.pi * u[2]),
+        smooth=jnp.array(False),
+        share=jnp.broadcast_to(scene.ground.evaluate(nm), nm.shape),
+    )
+    inward = place.leg.path.direction
+    for i, x in enumerate(scene.surfaces):
+        normal = x.shape.normal(point.position)
+        behind = jnp.dot(inward, normal) > 0.0
+        wall = Wall(
+            point=point,
+            normal=jnp.where(behind, -normal, normal),
+            onward=stop_gradient(x.material.turn(inward, normal, u)),
+            smooth=jnp.array(x.material.smooth),
+            share=jnp.broadcast_to(x.material.share(nm), nm.shape),
+        )
+        mine = place.leg.surface == i
+        found = jax.tree.map(lambda a, b, m=mine: jnp.where(m, a, b), wall, found)
+    return found
+
+
+def falls(quest: Quest, bend: Bend, direction: Direction) -> Float[Array, "wl"]:
+    """How much of the light that turns here comes from a direction, per sr."""
+    apart = versine(bend.inward, direction)
+    found = phase(quest.scene, quest.wavelength, bend.mixture, apart)
+    level = jnp.maximum(jnp.dot(bend.normal, direction), 0.0) / math.pi
+    return jnp.where(bend.solid, level, found)
