@@ -81,7 +81,7 @@ def measure(
     """The rows of one entrant for one class: kept, or made; none where it refuses."""
     effort = Effort(3, 3.0) if arguments.quick else Effort(5, 40.0)
     marks = "".join(x.mark for x in problems)
-    setting = getattr(entrant, "setting", "")
+    setting = entrant.setting
     stamp = f"{name}/{entrant.method}/{setting}/{entrant.edition}/{machine()}/"
     stamp += f"{marks}/{effort.runs}"
     found = kept.get(stamp)
@@ -155,6 +155,8 @@ def main() -> int:
     noise = {name: uncertainty(x) for name, x in found.items()}
     notes = [machine(), f"median of warm runs{', quick' * arguments.quick}"]
     notes += ["other solvers: 720 directions, drawn out to 41 wavelengths"]
+    if CLOUDS in found:
+        notes += ["clouds: the truth is nanodisort's own code with 256 streams"]
     notes += [f"missing: {x}" for x in missing]
     draw(arguments.folder / "chart.png", rows, noise, notes)
     return 0

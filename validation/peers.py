@@ -88,15 +88,15 @@ def optics(scene: atmos.Scene, wavelength, altitudes, count: int) -> Optics:
     look = lambda z: jnp.stack([x.profile.density(place(z)) for x in scene.media])
     density = np.asarray(jax.vmap(look)(jnp.asarray(altitudes)), float)
     nm = jnp.asarray(wavelength)
-    none = np.zeros(len(wavelength))
+    every = lambda x: np.broadcast_to(np.asarray(x, float), nm.shape)
     scattering = np.stack(
         [
-            none if x.scattering is None else np.asarray(x.scattering.evaluate(nm))
+            every(0.0 if x.scattering is None else x.scattering.evaluate(nm))
             for x in scene.media
         ]
     )
     moments = [np.asarray(x.phase.moments(count, nm), float) for x in scene.media]
-    extinction = np.stack([np.asarray(x.extinction(nm)) for x in scene.media])
+    extinction = np.stack([every(x.extinction(nm)) for x in scene.media])
     moments = np.stack([np.broadcast_to(x, (count, len(nm))) for x in moments])
     total = density @ extinction
     scattered = density @ scattering
