@@ -210,6 +210,9 @@ def main() -> int:
         found[name] = kept(name, arguments)
         x = found[name]
         state = "FAILED" if x.failed else "ok"
+        words = x.said.strip().splitlines()
+        if not x.claims and words:  # it claims nothing, and says why
+            missing.append(f"{name}: {words[0]}")
         print(f"{name:20} {len(x.claims):4} claims {x.seconds:6.0f} s  {state}")
         for claim in x.claims:
             if claim["verdict"] == "FAILED":
