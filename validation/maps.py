@@ -118,6 +118,8 @@ def apart(found: np.ndarray, due: np.ndarray) -> float:
     kept = due > 1e-12
     if not np.all(np.isfinite(found)):
         return math.inf
+    if not np.any(kept):
+        return math.nan
     return float(np.percentile(np.abs(found[kept] / due[kept] - 1.0), 95.0))
 
 
@@ -265,19 +267,18 @@ def once(solver, depth, directions):
     slab = medium.Medium(slab.profile, depth / columns.DEEP, 0.0, slab.phase)
     scene = eqx.tree_at(lambda x: x.media, scene, (slab,))
     sky = atmos.solve(scene, solver, jnp.array([500.0]))
-    return jax.vmap(sky.radiance, (None, 0))(jnp.zeros(3), directions)[:, 0]
+    top = jnp.array([0.0, 0.0, columns.DEEP])
+    return jax.vmap(sky.radiance, (None, 0))(top, directions)[:, 0]
 
 
 def steps() -> Map:
-    """Light that turned once in a slab, seen from below."""
+    """Light that turned once in a slab, seen from above."""
     up = COSINES[COSINES > 0.0]
-    views = np.stack([np.sqrt(1.0 - up**2), 0.0 * up, up], -1)
+    views = np.stack([np.sqrt(1.0 - up**2), 0.0 * up, -up], -1)
 
     def due(depth):
-        rate = 1.0 / SUN - 1.0 / up
-        with np.errstate(over="ignore"):
-            whole = np.exp(-depth / up) * -np.expm1(-depth * rate) / rate
-        return whole / (4.0 * math.pi * up)
+        whole = -np.expm1(-depth * (1.0 / SUN + 1.0 / up))
+        return SUN / (SUN + up) * whole / (4.0 * math.pi)
 
     depths = [*DEPTHS, 1000.0]
     methods = {
