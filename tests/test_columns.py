@@ -5,6 +5,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from hostile import decades, drawn, within
+from hypothesis import given
 
 from atmos.geometry import Flat, Spherical
 from atmos.light import Sun
@@ -110,7 +112,7 @@ def test_thick_clouds_pass_as_much_as_diffusion_theory_says(depth):
     assert abs(reflected + transmitted - 1.0) < 1e-10
 
 
-@pytest.mark.parametrize("depth", [0.0, 1e-12, 0.1, 10.0, 100.0, 1000.0])
+@pytest.mark.parametrize("depth", [0.0, 1e-12, 0.1, 10.0, 1000.0, 1e5])
 @pytest.mark.parametrize("g", [0.0, 0.85, 0.99])
 def test_what_is_not_absorbed_comes_back_from_white_ground(depth, g):
     up, diffuse, direct = fluxes(at(depth, 1.0, g, 0.3, 1.0))
@@ -340,3 +342,19 @@ def test_media_that_change_sideways_are_refused():
     scene = eqx.tree_at(lambda x: x.media, layered, (ball,))
     with pytest.raises(ValueError, match="media.0..profile. must depend on altitude"):
         solve(scene, SOLVER, NM)
+
+
+# In a flat world there is light from a sun as low as one likes.
+SLAB = decades(1e-12, 1e4, 0.0, 1.0), within(0.0, 1.0, 1.0 - 1e-12, 1.0 - 1e-6)
+# Lobes that throw light back swing below nothing with so few streams.
+LOBE = within(0.0, 0.99, 0.9)
+SUN = within(1e-3, 0.999, 0.5 + 0.5 / np.sqrt(3.0))
+
+
+@drawn(600)
+@given(*SLAB, LOBE, SUN, within(0.0, 1.0), within(0.2, 0.8))
+def test_random_skies_are_bright_and_have_slopes(depth, albedo, g, sun, ground, cut):
+    value, slope = brightness(at(depth, albedo, g, sun, ground, cut=cut))
+    # Eight layers do not follow light to where next to nothing is left of it.
+    assert np.isfinite(value) and value >= -1e-9
+    assert np.isfinite(slope).all()

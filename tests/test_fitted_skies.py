@@ -10,6 +10,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from hostile import drawn, within
+from hypothesis import given, strategies as st
 from scipy.special import expn
 
 from atmos import colour, deg, render, render_disks
@@ -179,11 +181,13 @@ def brightness(sky, directions):
     return sum(beams, jnp.sum(jax.vmap(look)(directions)))
 
 
+slopes = eqx.filter_jit(eqx.filter_grad(brightness))
+
+
 @pytest.mark.parametrize("name", [x for x in MODELS if x.values != ("hosek-rgb",)])
 def test_every_number_has_a_gradient_everywhere(name):
     sky, rays = SKIES[name](55 * deg, ground=0.2), hard_directions(55 * deg)
     rays = rays[rays[:, 2] >= 0.0]
-    slopes = eqx.filter_jit(eqx.filter_grad(brightness))
     for zenith in (0.0, 55.0, 90.0):
         found = slopes(SKIES[name](zenith * deg, ground=0.2), rays)
         assert all(np.all(np.isfinite(x)) for x in jax.tree.leaves(found)), zenith
@@ -603,3 +607,38 @@ def test_overcast_skies_have_no_sun():
     sky = Perez.measured(50 * deg, 0.0, 0.0, 120.0, NM)
     np.testing.assert_allclose(sky.clearness, 1.0, rtol=1e-12)
     assert np.all(receive(sky)[1][0] == 0.0)
+
+
+PARAMETERS = {
+    "preetham": (Preetham, ["turbidity"]),
+    "hosek": (Hosek, ["turbidity"]),
+    "hosek-rgb": (HosekRGB, ["turbidity"]),
+    "perez": (Perez, ["clearness", "brightness"]),
+    "cie": (CIE, []),
+}
+
+
+@every_sky
+@drawn(60)
+@given(data=st.data())
+def test_random_skies_are_bright_and_have_slopes_or_are_refused(name, data):
+    """Of any numbers that the model holds for."""
+    model, names = PARAMETERS[name]
+    draw = lambda x: data.draw(within(model.ranges[x].low, model.ranges[x].high), x)
+    zenith, ground = draw("sun_zenith"), data.draw(within(0.0, 1.0))
+    numbers = {x: draw(x) for x in names}
+    if name == "cie":
+        kind = data.draw(st.integers(1, 15))
+        numbers = {"sky_type": kind, "scale": ZenithLuminance(3000.0)}
+    try:
+        given = {"sun_zenith": zenith, "sun_azimuth": 0.7, "wavelength": NM}
+        sky = model(**given, **numbers, ground=ground)
+    except ValueError as refused:
+        assert "must" in str(refused)
+        return
+    rays = hard_directions(55 * deg)
+    seen = np.asarray(look(sky, jnp.concatenate([rays, light_of(sky)[None]])))
+    assert np.all(np.isfinite(seen) & (seen >= 0.0))
+    if name != "hosek-rgb":
+        found = slopes(sky, rays[rays[:, 2] >= 0.0])
+        assert all(np.all(np.isfinite(x)) for x in jax.tree.leaves(found))

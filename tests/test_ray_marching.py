@@ -8,6 +8,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from hostile import decades, drawn, within
+from hypothesis import given
 
 from atmos import render
 from atmos.camera import Perspective
@@ -325,3 +327,18 @@ def test_grey_media_cast_grey_shadows_in_pictures_of_many_rays():
     picture = np.asarray(render(sky, camera), float)
     assert np.std(picture[..., 0]) > 0.1 * np.mean(picture[..., 0])
     np.testing.assert_allclose(picture, picture[..., :1] + 0 * picture, rtol=1e-5)
+
+
+DENSE, TURN = decades(1e-9, 1e6, 0.0), within(0.0, 1.0)
+UPWARDS = within(-1.0, 1.0, 0.0)
+
+
+@drawn(40)
+@given(DENSE, DENSE, within(-0.99, 0.99), UPWARDS, TURN)
+def test_random_boxes_are_bright(scattering, absorption, g, up, ground):
+    """The box of the closed form, however thick, under a sun however low."""
+    coefficients = PowerLaw(scattering, -1.0), absorption
+    box = Medium(BOX.profile, *coefficients, HenyeyGreenstein(g))
+    sun = np.array([np.sqrt(1.0 - up * up), 0.0, up])
+    found = seen(scene(box, sun=sun, ground=ground), MARCH, *RAYS)
+    assert np.all(np.isfinite(found) & (found >= 0.0))

@@ -7,6 +7,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from hostile import decades, drawn, within
+from hypothesis import given
 
 from atmos.geometry import Flat, Spherical
 from atmos.light import Sun
@@ -136,15 +138,18 @@ def planet(depth, g, ground):
     return Scene(Spherical(6.4e6), 1e5, (air,), (), ground)
 
 
+@eqx.filter_jit
+def total(x):
+    field = solve(planet(*x), SHARED, NM).prepared.field
+    return jnp.sum(field.moments) + jnp.sum(field.down)
+
+
+slopes = eqx.filter_jit(jax.grad(total))
+
+
 def test_gradients_agree_with_differences():
     start = jnp.array([0.4, 0.5, 0.3])
-
-    @eqx.filter_jit
-    def total(x):
-        field = solve(planet(*x), SHARED, NM).prepared.field
-        return jnp.sum(field.moments) + jnp.sum(field.down)
-
-    slope = eqx.filter_jit(jax.grad(total))(start)
+    slope = slopes(start)
     for i, step in enumerate(1e-5 * np.eye(3)):
         due = (total(start + step) - total(start - step)) / 2e-5
         assert abs(slope[i] / due - 1.0) < 1e-5, i
@@ -178,3 +183,31 @@ def test_media_that_change_sideways_are_refused():
     scene = eqx.tree_at(lambda x: x.media, slab(*numbers(0.1)), (ball,))
     with pytest.raises(ValueError, match="media.0..profile. must depend on altitude"):
         solve(scene, SHARED, NM)
+
+
+DEPTH, SHARE = decades(1e-12, 3.0, 0.0), within(0.0, 1.0)
+LOBE = within(-0.99, 0.99, 0.0)
+
+
+@drawn(300)
+@given(DEPTH, DEPTH, LOBE, SHARE, within(1e-3, 1.0), SHARE)
+def test_random_skies_are_bright_or_refused(air, haze, g, albedo, cosine, ground):
+    try:
+        scene = slab(*numbers(air, haze, g, albedo, cosine, ground))
+        seen = np.asarray(looks(scene, SHARED))
+    except RuntimeError as refused:
+        assert "must not scatter more than an optical depth of 1" in str(refused)
+        return
+    # Where next to nothing is left between layers, cubics swing below it.
+    assert np.all(np.isfinite(seen) & (seen >= -1e-4 * seen.max()))
+
+
+@drawn(100)
+@given(decades(1e-12, 1.0, 0.0), LOBE, SHARE)
+def test_random_skies_have_slopes(depth, g, ground):
+    try:
+        found = slopes(jnp.array([depth, g, ground]))
+    except RuntimeError as refused:
+        assert "must not scatter more than an optical depth of 1" in str(refused)
+        return
+    assert np.all(np.isfinite(found))

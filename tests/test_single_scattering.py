@@ -6,6 +6,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 import quadrature
+from hostile import decades, drawn, rows, within
+from hypothesis import given
 from quadrature import ALBEDO, ASYMMETRY, OZONE, RADIUS, SHARE, TOP
 
 from atmos.geometry import Flat, Spherical
@@ -331,9 +333,27 @@ def test_twilight_fades_without_a_plateau():
     assert abs(last - np.degrees(np.arccos(RADIUS / (RADIUS + TOP)))) < 0.125
 
 
+CHUNK = 38
+
+
+def slopes(scene, *angles):
+    """Radiances; gradients of their sum by all numbers of the scene and all angles.
+
+    With as many scenes as angles, of each. In chunks, which share a compilation.
+    """
+    count = len(angles[0])
+    if scene.top.ndim == 0:
+        every = lambda x: jnp.broadcast_to(x, (count, *x.shape))
+        scene = jax.tree.map(every, scene)
+    parts = [
+        chunk_slopes(*jax.tree.map(lambda x, i=i: x[i : i + CHUNK], (scene, *angles)))
+        for i in range(0, count, CHUNK)
+    ]
+    return jax.tree.map(lambda *x: np.concatenate(x), *parts)
+
+
 @eqx.filter_jit
-def slopes(scene, altitudes, zeniths, azimuths, suns):
-    """Radiances; gradients of their sum by all numbers of the scene and all angles."""
+def chunk_slopes(scenes, altitudes, zeniths, azimuths, suns):
 
     def total(arguments):
         scene, altitude, zenith, azimuth, sun = arguments
@@ -343,10 +363,11 @@ def slopes(scene, altitudes, zeniths, azimuths, suns):
         found = sky.radiance(position, towards(zenith, azimuth))
         return jnp.sum(found), found
 
-    def one(*angles):
-        return eqx.filter_value_and_grad(total, has_aux=True)((scene, *angles))
+    def one(*arguments):
+        return eqx.filter_value_and_grad(total, has_aux=True)(arguments)
 
-    (_, found), gradients = jax.vmap(one)(altitudes, zeniths, azimuths, suns)
+    looks = scenes, altitudes, zeniths, azimuths, suns
+    (_, found), gradients = jax.vmap(one)(*looks)
     return found, gradients
 
 
@@ -473,3 +494,48 @@ def test_gradients_are_the_slopes_of_the_radiance():
         due, got = (higher - lower) / (2.0 * step), np.asarray(number(by_scene))[:count]
         error = np.abs(got - due) / np.maximum(np.abs(due), 0.01 * typical / abs(value))
         assert error.max() < 1e-5, (name, error)
+
+
+# So much air, dust and ozone; albedo and asymmetry of the dust, the ground's albedo;
+# radius and scale height; and an eye, a view and a sun.
+AMOUNT = decades(1e-9, 1e3, 0.0)
+SHARES = within(0.0, 1.0), within(-0.999, 0.999, 0.0, 1e-6), within(0.0, 1.0)
+LENGTHS = decades(1e5, 1e9, RADIUS), decades(30.0, 3e4)
+EYE = decades(1e-3, 1e8, 0.0, TOP, TOP - 0.01, TOP + 0.01)
+ANGLE = within(0.0, np.pi, HORIZON, HORIZON + 1e-3, HORIZON + 0.1, 1e-4)
+
+
+@drawn(32)
+@given(rows(CHUNK, AMOUNT, AMOUNT, AMOUNT, *SHARES, *LENGTHS, EYE, *3 * [ANGLE]))
+def test_random_skies_are_finite_and_so_are_their_slopes(draws):
+    """Each by itself, in single precision; seen from no farther than 1000 radii."""
+    air, dust, ozone, albedo, g, ground, radius, height, *look = draws.T
+    look[0] = np.minimum(look[0], 1e3 * radius)
+    many = jax.tree.map(lambda x: jnp.broadcast_to(x, (CHUNK, *x.shape)), FULL)
+
+    def numbers(scene):
+        clear, hazy, absorbs = scene.media
+        yield clear.scattering.value, air
+        yield hazy.scattering.one.value, dust
+        yield hazy.absorption.one.value, dust
+        yield absorbs.absorption.values, ozone[:, None]
+
+    scaled = [value * by for value, by in numbers(many)]
+    scaled += [albedo, albedo, g, ground, radius, height]
+    single = lambda x: jnp.asarray(x, jnp.float32)
+
+    def where(scene):
+        dusty = scene.media[1]
+        return [
+            *(scene.media[0].scattering.value, dusty.scattering.one.value),
+            *(dusty.absorption.one.value, scene.media[2].absorption.values),
+            *(dusty.scattering.other.value, dusty.absorption.other.of.value),
+            *(dusty.phase.g.value, scene.ground.value),
+            *(scene.geometry.radius, dusty.profile.scale_height),
+        ]
+
+    many = eqx.tree_at(where, many, [single(x) for x in scaled])
+    found, gradients = slopes(cast(many, jnp.float32), *(single(x) for x in look))
+    assert np.all(np.isfinite(found) & (found >= 0.0))
+    for path, leaf in jax.tree_util.tree_leaves_with_path(gradients):
+        assert np.all(np.isfinite(leaf)), jax.tree_util.keystr(path)

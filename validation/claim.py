@@ -23,18 +23,21 @@ class Claim(NamedTuple):
 
 
 def main(
-    description: str | None, claims: Callable[[argparse.Namespace], Iterable[Claim]]
+    description: str | None,
+    claims: Callable[[argparse.Namespace], Iterable[Claim]],
+    options: Callable[[argparse.ArgumentParser], None] = lambda parser: None,
 ) -> int:
     """Prints claims as a table; returns 1 if one of them fails, 0 otherwise.
 
     `--truth` is where a validation finds published tables, if it reads any; `--json` is
-    a file that the claims are written to as well.
+    a file that the claims are written to as well. `options` adds others.
     """
     parser = argparse.ArgumentParser(
         description=description, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--truth", type=pathlib.Path, help="folder of published tables")
     parser.add_argument("--json", type=pathlib.Path, help="write the figures there")
+    options(parser)
     arguments = parser.parse_args()
     found = list(claims(arguments))
     print(f"{'claim':60} {'source':28} {'expected':>9} {'measured':>9}  verdict")

@@ -1,8 +1,9 @@
 """All orders of scattering: the truth by path tracing, and solvers against it.
 
-The truth is traced for the scenes `reference_r`, `_ra` and `_rao` in five colours: from
-the ground at 24 zenith angles to 89 degrees and 19 azimuths, for suns from 30 to 102
-degrees; and from 10, 35 and 400 km looking down and at the limb. It is kept in a file,
+The truth is traced for the scenes `reference_r`, `_ra` and `_rao` in five colours (and,
+if asked for, `hazy`: `_rao` with eight times the aerosol): from the ground at 24 zenith
+angles to 89 degrees and 19 azimuths, for suns from 30 to 102 degrees; and from 10, 35
+and 400 km looking down and at the limb. It is kept in a file,
 which a later run goes on from: blocks of paths are added to each case until it has
 `--samples` a direction, or everywhere a relative standard error of `--error`.
 
@@ -37,6 +38,8 @@ from atmos.solver import PathTracing, SingleScattering, solve
 
 WAVELENGTH = np.array([380.0, 450.0, 550.0, 650.0, 770.0], np.float32)
 SCENES = ["r", "ra", "rao"]
+HAZY = "hazy"
+THIN, THICK = "value = 4.1666666667e-5", "value = 33.3333333336e-5"
 SUNS = [30.0, 60.0, 80.0, 88.0, 92.0, 96.0, 102.0]
 # More of the lowest: that is where methods differ.
 ZENITHS = np.concatenate([np.arange(0.0, 75.0, 7.5), np.linspace(75.0, 89.0, 14)])
@@ -55,8 +58,15 @@ class Case(NamedTuple):
         return f"{self.scene} {self.sun:g} {self.altitude / km:g}"
 
 
+def described(folder: pathlib.Path, scene: str) -> str:
+    """What the file of a scene says."""
+    if scene == HAZY:
+        return described(folder, "rao").replace(THIN, THICK)
+    return (folder / f"reference_{scene}.toml").read_text()
+
+
 def cases() -> Iterator[Case]:
-    for scene in SCENES:
+    for scene in [*SCENES, HAZY]:
         for sun in SUNS:
             for altitude in [0.0, *HIGH]:
                 yield Case(scene, sun, altitude)
@@ -84,19 +94,19 @@ def vectors(zenith, azimuth) -> np.ndarray:
 
 @eqx.filter_jit
 def trace(sky, sun, positions, directions, block):
-    world = sky.prepared, sky.scene, _facing(sky.scene, sun), sky.wavelength
+    world = sky.prepared, sky.scene, facing(sky.scene, sun), sky.wavelength
     tally = sky.solver.tally(*world, positions, directions, block)
     return tally.mean, tally.standard_error
 
 
 @eqx.filter_jit
 def march(sky, sun, positions, directions):
-    sky = eqx.tree_at(lambda x: x.scene.lights[0], sky, _facing(sky.scene, sun))
+    sky = eqx.tree_at(lambda x: x.scene.lights[0], sky, facing(sky.scene, sun))
     look = lambda x: sky.radiance(*x)
     return jax.lax.map(look, (positions, directions), batch_size=32)
 
 
-def _facing(scene, sun):
+def facing(scene, sun):
     return eqx.tree_at(lambda x: x.direction, scene.lights[0], sun)
 
 
@@ -135,11 +145,9 @@ def make(truth: Truth, arguments: argparse.Namespace) -> None:
     """Traces what the file lacks."""
     started, traced = time.perf_counter(), 0
     for scene_name in arguments.scene:
-        path = arguments.scenes / f"reference_{scene_name}.toml"
-        scene = scenefile.load(path)
-        truth.check(
-            **{f"scene {scene_name}": path.read_text(), "--walks": arguments.walks}
-        )
+        text = described(arguments.scenes, scene_name)
+        scene = scenefile.parse(text)
+        truth.check(**{f"scene {scene_name}": text, "--walks": arguments.walks})
         # All that is drawn is of the key and of the block, which the file counts.
         solver = PathTracing(jax.random.key(20), 1, arguments.walks, PATHS)
         sky = solve(scene, solver, WAVELENGTH)
@@ -147,6 +155,8 @@ def make(truth: Truth, arguments: argparse.Namespace) -> None:
         once_sky = solve(scene, fine, WAVELENGTH)
         for case in cases():
             if case.scene != scene_name or case.sun not in arguments.suns:
+                continue
+            if case.altitude / km not in arguments.altitudes:
                 continue
             angles = looks(case.altitude, float(scene.geometry.radius))
             directions = jnp.asarray(vectors(*angles.T))
@@ -195,8 +205,8 @@ def compare(truth: Truth, name: str, arguments: argparse.Namespace) -> None:
     """Mean and largest error of a solver beyond two standard errors, in per cent."""
     print(f"\n{name}: mean / largest relative error beyond two standard errors, %")
     for scene_name in arguments.scene:
-        path = arguments.scenes / f"reference_{scene_name}.toml"
-        sky = solve(scenefile.load(path), getattr(atmos.solver, name)(), WAVELENGTH)
+        scene = scenefile.parse(described(arguments.scenes, scene_name))
+        sky = solve(scene, getattr(atmos.solver, name)(), WAVELENGTH)
         print(
             f"{scene_name:6}" + "".join(f"{x:>9g} km      " for x in [0, 10, 35, 400])
         )
@@ -364,8 +374,11 @@ def main() -> int:
     parser.add_argument("--samples", type=int, default=0, help="most, a direction")
     parser.add_argument("--error", type=float, default=0.0, help="that is enough")
     parser.add_argument("--walks", type=int, default=256, help="at once, a direction")
-    parser.add_argument("--scene", nargs="*", default=SCENES, choices=SCENES)
+    known = [*SCENES, HAZY]
+    parser.add_argument("--scene", nargs="*", default=SCENES, choices=known)
     parser.add_argument("--suns", nargs="*", type=float, default=SUNS)
+    heights = [0.0, *(x / km for x in HIGH)]
+    parser.add_argument("--altitudes", nargs="*", type=float, default=heights)
     parser.add_argument("--solver", nargs="*", default=[], help="to compare, by name")
     parser.add_argument("--slabs", type=int, default=0, help="rays a flux, if wanted")
     arguments = parser.parse_args()

@@ -140,7 +140,8 @@ class Peaks(eqx.Module):
         # The moments along the way over that of degree 0, as on average.
         seen = contract("sm,ml->sl", event, peak[:, 0]) * most
         share = contract("nl,nkl->kl", contract("sl,sn->nl", seen, passed), peak)
-        some = share[:1] > 0.0
+        # Of less the square, by which slopes are divided, is 0 already.
+        some = share[:1] > float(jnp.finfo(share.dtype).tiny) ** 0.5
         ratio = jnp.where(some, share / jnp.where(some, share[:1], 1.0), 0.0)
         ratio = jnp.clip(ratio, -1.0, 1.0)
         zeroth = contract("sn,nl->sl", passed, peak[:, 0])

@@ -95,6 +95,8 @@ class SingleScattering(AbstractSolver):
         within = contract(
             "ij,pjm->pim", jnp.asarray(cumulative(self.nodes), far.dtype), steps
         )
+        # Where a piece is far too thick for its places, it would shine by itself.
+        within = jnp.where(within < 0.0, 0.0, within)
         whole = contract("j,pjm->pm", w, steps)
         before = jnp.cumsum(whole, 0) - whole
         passed = before[:, None, :] + within + jax.vmap(jax.vmap(to_light))(points)
