@@ -5,6 +5,7 @@ Exits with 1 where a bar is missed.
 """
 
 import argparse
+import dataclasses
 import json
 import os
 import pathlib
@@ -21,6 +22,7 @@ import jax.numpy as jnp
 
 import atmos
 from atmos import camera, colour, deg, light, render, render_disks, solver
+from atmos.geometry import Flat
 
 
 NM = jnp.linspace(380.0, 780.0, 41)
@@ -62,6 +64,25 @@ def pictures():
         yield name, *measure(work), bar
 
 
+def solutions():
+    """The same of solvers that find all orders of scattering."""
+    at = jnp.array([0.0, 0.0, 2.0])
+    earth = atmos.earth(light.Sun.at(60 * deg, 0.0, light.sunlight()))
+    flat = dataclasses.replace(earth, geometry=Flat())
+    dome = camera.LatLong(at, 512)
+    quick = {"single": solver.QUICK}
+    columns, shells = solver.Columns(**quick), solver.Shells(**quick)
+    shared = solver.Shared(**quick)
+    work = lambda world, method: atmos.solve(world, method, NM).prepared
+    whole = lambda method: render(atmos.solve(earth, method, NM), dome)
+    yield "Columns, flat: solution", *measure(lambda: work(flat, columns)), 0.25
+    yield "Columns: solution and dome", *measure(lambda: whole(columns)), 0.6
+    yield "Shared: solution and dome", *measure(lambda: whole(shared)), None
+    yield "Shells: solution", *measure(lambda: work(earth, shells), 2), 30.0
+    sky = atmos.solve(earth, shells, NM)
+    yield "Shells: dome from it", *measure(lambda: render(sky, dome)), 0.6
+
+
 def commands():
     """The first `atmos sky` of a machine, and the next."""
     with tempfile.TemporaryDirectory() as folder:
@@ -95,7 +116,7 @@ def main():
     parser.add_argument("--json", type=pathlib.Path, help="write the figures there")
     parser.add_argument("--no-commands", action="store_true", help="pictures only")
     arguments = parser.parse_args()
-    rows = list(pictures())
+    rows = [*pictures(), *solutions()]
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
     rows += [] if arguments.no_commands else list(commands())
 

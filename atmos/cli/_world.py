@@ -149,7 +149,7 @@ EACH = _WALKS * _PATHS
 
 def tracer(scene: Scene) -> AbstractTracing:
     """The solver that traces paths through a scene: layers have one of their own."""
-    plain = scene.suns == scene.lights and not scene.surfaces
+    plain = len(scene.suns) == len(scene.lights) and not scene.surfaces
     if plain and all(x.profile.layered and x.emission is None for x in scene.media):
         return PathTracing(walks=_WALKS, paths=_PATHS)
     return VolumeTracing(walks=_WALKS, paths=_PATHS, cells=32)
