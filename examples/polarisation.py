@@ -37,10 +37,10 @@ def shades(stokes):
     """The degree of polarisation as a grey, and the angle of vibration as a hue."""
     degree = jnp.clip(polarisation.degree(stokes) / FULL, 0.0, 1.0)
     # Neutral points are small: a root makes their surroundings stand out.
-    grey = jnp.sqrt(degree)[..., None] * jnp.ones(3)
-    turns = polarisation.angle(stokes)[..., None] / jnp.pi
-    hue = 0.5 + 0.5 * jnp.cos(2.0 * jnp.pi * (turns - jnp.array([0.0, 1.0, 2.0]) / 3.0))
-    return grey, hue * grey
+    grey = jnp.repeat(jnp.sqrt(degree)[..., None], 3, -1)
+    angle = 2.0 * polarisation.angle(stokes)
+    hue = [0.5 + 0.5 * jnp.cos(angle - i * 120 * deg) for i in range(3)]
+    return grey, jnp.stack(hue, -1) * grey
 
 
 def main(folder, size, solver):

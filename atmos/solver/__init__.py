@@ -1,15 +1,12 @@
-from ._base import (
-    AbstractSolver as AbstractSolver,
-    admit as admit,
-    solve as solve,
-    SolvedSky as SolvedSky,
-)
+from ._base import AbstractSolver as AbstractSolver
 from ._diffuse import Fluxes as Fluxes
 from ._shadows import (
     AbstractShadows as AbstractShadows,
     ShadowCache as ShadowCache,
     ShadowRays as ShadowRays,
 )
+from ._sky import SolvedSky as SolvedSky
+from ._solve import admit as admit, solve as solve
 from ._steps import (
     AbstractSteps as AbstractSteps,
     Adaptive as Adaptive,

@@ -92,7 +92,7 @@ class Peaks(eqx.Module):
 
         # The last of the places is where the line of sight ends.
         found = jax.vmap(ahead)(jnp.append(places.ravel(), far))
-        cells = lambda x: x[:-1].reshape(*places.shape, -1)
+        cells = lambda x: x[:-1].reshape(*places.shape, x.shape[-1])
         density, sunwards, rise = found
         amount = cells(density) * length[:, None, None]
         whole = contract("j,pjm->pm", w, amount)

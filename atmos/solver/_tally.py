@@ -10,7 +10,8 @@ from jaxtyping import Array, Float, Integer, PyTree, Scalar
 from ..light import AbstractLight
 from ..quantity import Direction, Number, Position, Wavelength
 from ..scene import Scene
-from ._base import AbstractSolver, SolvedSky
+from ._base import AbstractSolver
+from ._sky import SolvedSky
 from ._trip import Trip
 from ._walk import Walk
 from .single_scattering import SingleScattering

@@ -88,9 +88,13 @@ class SingleScattering(AbstractSolver):
         # Crowd the places at both ends of a piece: one is thicker, the other nearer.
         places = begin[:, None] + length[:, None] * (u * u * (3.0 - 2.0 * u))[None]
         slope = length[:, None] * (6.0 * u * (1.0 - u))[None]
-        points = jax.vmap(jax.vmap(path.at))(places)
-
-        found = jax.vmap(jax.vmap(lambda point: densities(scene, point)))(points)
+        points = jax.vmap(path.at)(jnp.append(places.ravel(), far))
+        # Where the ray ends on the ground it has no digits to lose.
+        height = points.altitude.at[-1].set(0.0)
+        points = Point(points.position, height, points.up)
+        known = jax.vmap(lambda x: (densities(scene, x), to_light(x)))(points)
+        cells = lambda x: x[:-1].reshape(*places.shape, x.shape[-1])
+        found, sunwards = (cells(x) for x in known)
         steps = found * slope[:, :, None]
         within = contract(
             "ij,pjm->pim", jnp.asarray(cumulative(self.nodes), far.dtype), steps
@@ -99,7 +103,7 @@ class SingleScattering(AbstractSolver):
         within = jnp.where(within < 0.0, 0.0, within)
         whole = contract("j,pjm->pm", w, steps)
         before = jnp.cumsum(whole, 0) - whole
-        passed = before[:, None, :] + within + jax.vmap(jax.vmap(to_light))(points)
+        passed = before[:, None, :] + within + sunwards
         arrives = jnp.exp(-contract("pim,ml->pil", passed, extinction))
         steps = jnp.where(lit[:, None, None], steps * w[None, :, None], 0.0)
         gathered = contract("pim,pil->ml", steps, arrives)
@@ -109,11 +113,9 @@ class SingleScattering(AbstractSolver):
             if x.scattering is not None
         ]
 
-        foot = path.at(far)
-        foot = Point(foot.position, jnp.zeros_like(far), foot.up)
-        passed = jnp.sum(whole, 0) + to_light(foot)
+        passed = jnp.sum(whole, 0) + known[1][-1]
         arrives = jnp.exp(-contract("m,ml->l", passed, extinction))
-        rise = jnp.maximum(jnp.dot(foot.up, light.direction), 0.0)
+        rise = jnp.maximum(jnp.dot(points.up[-1], light.direction), 0.0)
         albedo = scene.ground.evaluate(wavelength)
         ground = albedo / math.pi * rise * arrives * irradiance
         return jnp.stack([*air, jnp.where(grounded, ground, 0.0)])
