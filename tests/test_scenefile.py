@@ -308,7 +308,7 @@ SCENES = {
             Surface(Plane(row(9.0, 0.0, 0.0), row(0.6, 0.8, 0.0)), Mirror(SHARE)),
         ),
     ),
-    "a lamp alone": Scene(Flat(), 1.0, (), (Lamp(np.zeros(3), 1.0),)),
+    "a lamp alone": Scene(Flat(), 1.0, (), (Lamp(np.zeros(3), sunlight(5.0)),)),
     "no sun": Scene(Flat(), 1 * km, (air(),), ()),
     "another star": Scene(Flat(), 1 * km, (air(),), (Sun.at(1.0, 0.0, STAR),)),
 }

@@ -33,7 +33,7 @@ class Sun(Table, kw_only=True):
 class Lamp(Kind, tag="lamp"):
     makes = light.Lamp
     position: Place
-    intensity: Spectrum
+    intensity: Spectrum | Solar
 
     def build(self) -> light.Lamp:
         place = np.array(self.position)
@@ -45,7 +45,7 @@ class Spot(Kind, tag="spot"):
 
     position: Place
     direction: Place
-    intensity: Spectrum
+    intensity: Spectrum | Solar
     inner: Half
     outer: Half
 
