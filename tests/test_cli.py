@@ -42,6 +42,17 @@ SUNNY = THIN.replace("60.0", "50.0").replace(
     "irradiance = 2.0",
     'irradiance = { kind = "solar", bandwidth = 25 }\nangular_radius = 2',
 )
+LAMP = """
+[[light]]
+kind = "lamp"
+position = [0, 0, 10]
+intensity = 1
+"""
+BALL = """
+[[surface]]
+shape = { kind = "sphere", centre = [0, 0, 5], radius = 1 }
+material = { kind = "glass" }
+"""
 BANDS = "400:700:25"
 HEIGHT = 32
 
@@ -439,11 +450,21 @@ BAD = [
     ("radiance thin.toml more", "more", "Unused"),
     ("optical-depth thin.toml --wavelength 50", "--wavelength", "got '50'"),
     ("scene --output scene.txt", "--output", ".toml file; got scene.txt"),
+    ("radiance lamp.toml", "lamp.toml: `light[0]` must be a sun", "got Lamp"),
+    ("radiance dark.toml", "dark.toml: `light[0]` must be a sun", "got Lamp"),
+    ("sky lamp.toml", "lamp.toml: `light[0]` must be a sun", "got Lamp"),
+    ("sky dark.toml --sun-elevation 9", "sun", "alone to be moved; got 0"),
+    ("sky ball.toml", "ball.toml: `surface` must be empty", "got 1"),
+    ("render lamp.toml --solver march", "lamp.toml: `light[0]` must be", "got Lamp"),
 ]
 
 
 @pytest.mark.parametrize(("command", "name", "rest"), BAD)
-def test_bad_input_is_refused_in_one_line(capsys, command, name, rest):
+def test_bad_input_is_refused_in_one_line(capsys, folder, command, name, rest):
+    dark = f"{THIN.split('[sun]')[0]}{THIN[THIN.index('[[medium]]') :]}"
+    scenes = {"lamp": THIN + LAMP, "dark": dark + LAMP, "ball": THIN + BALL}
+    for kind, text in scenes.items():
+        (folder / f"{kind}.toml").write_text(text)
     out, err = run(capsys, command, 2)
     assert out == "" and err.count("\n") == 1 and err.startswith("atmos: ")
     assert name in err and rest in err

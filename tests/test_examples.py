@@ -65,6 +65,16 @@ def test_volumes():
     assert red > 3.0 * blue, "fire is yellow"
 
 
+def test_the_spot_shines_on_the_ball_through_the_smoke():
+    scene = parse((EXAMPLES / "lamp.toml").read_text())
+    (spot,), (ball,), (smoke,) = scene.lights, scene.surfaces, scene.media
+    reach = ball.shape.meet(spot.position, spot.direction, jnp.array(False))
+    top = (smoke.profile.upper[2] - spot.position[2]) / spot.direction[2]
+    assert 0.0 < top < reach < 6.0
+    values = np.asarray(smoke.profile.values)
+    assert 0.3 < values.mean() < 0.7 and values.std() > 0.1
+
+
 @pytest.mark.parametrize("name", ["cumulus", "fire"])
 def test_scene_files(name):
     text = (EXAMPLES / f"{name}.toml").read_text()

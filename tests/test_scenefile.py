@@ -6,15 +6,16 @@ import numpy as np
 import pytest
 import vdb_files
 
-from atmos import deg, earth, km, mars, medium, phase, Scene, spectrum
+from atmos import deg, earth, image, km, mars, medium, phase, Scene, spectrum
 from atmos.camera import Fisheye, LatLong, Perspective
 from atmos.geometry import Flat, Spherical
-from atmos.light import Sun, sunlight
+from atmos.light import Lamp, Spot, Sun, sunlight
 from atmos.particle import Air, CarbonDioxide, Depolarisation, Scattering
 from atmos.particle.aerosol import opac, optical_depth
 from atmos.particle.surface import albedo
 from atmos.scene import air, haze, ozone
 from atmos.scenefile import dump, GUIDE, load, load_camera, parse, parse_camera
+from atmos.surface import Glass, Lambertian, Mirror, Plane, Sphere, Surface
 
 
 PLANET = """
@@ -53,7 +54,29 @@ kind = "table"
 wavelength = [400, 600, 800]
 value = [4e-5, 2e-5, 1e-5]
 """
-TEXT = PLANET + SUN + CAMERA + AIR + HAZE
+LIT = """
+[[light]]
+kind = "lamp"
+position = [1, 2, 3]
+intensity = 4.0
+
+[[light]]
+kind = "spot"
+position = [0, 0, 7]
+direction = [0, 0.3, -0.4]
+intensity = { kind = "power_law", value = 2.0, exponent = 1.0 }
+inner = 10
+outer = 15
+
+[[surface]]
+shape = { kind = "sphere", centre = [0, 0, 8], radius = 5 }
+material = { kind = "lambertian", albedo = 0.8 }
+
+[[surface]]
+shape = { kind = "plane", place = [0, 0, 9], upright = [0, 0, 2] }
+material = { kind = "mirror", reflectance = 0.6 }
+"""
+TEXT = PLANET + SUN + CAMERA + AIR + HAZE + LIT
 
 
 def alike(a, b):
@@ -91,6 +114,63 @@ def test_the_sun_stands_where_the_file_says():
 def test_a_flat_planet_needs_no_radius():
     text = TEXT.replace('"spherical"', '"flat"').replace("radius = 6360e3\n", "")
     assert isinstance(parse(text).geometry, Flat)
+
+
+def test_lamps_and_surfaces_lie_where_the_file_says():
+    _, lamp, spot = parse(TEXT).lights
+    np.testing.assert_array_equal(lamp.position, [1.0, 2.0, 3.0])
+    np.testing.assert_allclose(spot.direction, [0.0, 0.6, -0.8], rtol=1e-15)
+    np.testing.assert_allclose([spot.inner, spot.outer], np.radians([10.0, 15.0]))
+    # A power law of exponent 1 through 2 at 550 nm.
+    nm = jnp.array([275.0])
+    assert (lamp.intensity.evaluate(nm), spot.intensity.evaluate(nm)) == (4.0, 1.0)
+    ball, wall = parse(TEXT).surfaces
+    assert ball.shape.radius == 5.0 and ball.material.share(nm) == 0.8
+    np.testing.assert_array_equal(wall.shape.normal(jnp.zeros(3)), [0.0, 0.0, 1.0])
+    assert wall.material.share(nm) == 0.6
+    short = """
+[[surface]]
+shape = { kind = "plane", place = [0, 0, 0.1] }
+material = { kind = "lambertian", albedo = "snow" }
+"""
+    level = Plane(row(0.0, 0.0, 0.1), row(0.0, 0.0, 1.0))
+    due = (Surface(level, Lambertian(albedo("snow"))),)
+    alike(parse(PLANET + SUN + short).surfaces, due)
+
+
+def test_where_nothing_shines_a_file_must_say_so():
+    lit = LIT.split("[[surface]]")[0]
+    assert len(parse(PLANET + lit).lights) == 2
+    assert len(parse(PLANET + GLOW).media) == 1
+    assert parse("sun = []" + PLANET).lights == ()
+    with pytest.raises(ValueError, match="^`sun` is missing, and nothing else"):
+        parse(PLANET + AIR)
+
+
+GLOW = """
+[[medium]]
+emission = 1.0
+profile = { kind = "box", lower = [0, 0, 0], upper = [1, 1, 1] }
+"""
+
+
+def test_what_lies_all_around_is_a_picture_beside_the_scene(tmp_path):
+    path, picture = tmp_path / "scene.toml", tmp_path / "dusk.exr"
+    around = 'kind = "surrounding"\nfile = "dusk.exr"\ncentre_azimuth = 90'
+    path.write_text(f"{PLANET}\n[[light]]\n{around}")
+    with pytest.raises(ValueError, match=r"`light\[0\].file`: dusk.exr: cannot be"):
+        load(path)
+    pixels = np.arange(16.0, dtype=np.float32).reshape(2, 4, 2)
+    image.write_spectral_exr(picture, pixels, np.array([450.0, 650.0]))
+    (found,) = load(path).lights
+    np.testing.assert_array_equal(found.picture, pixels)
+    np.testing.assert_allclose(found.centre, 0.5 * np.pi)
+    image.write_spectral_exr(picture, pixels[:, :3], np.array([450.0, 650.0]))
+    with pytest.raises(ValueError, match=r"`light\[0\].file` must be twice as wide"):
+        load(path)
+    # In memory nothing says what file it was.
+    with pytest.raises(ValueError, match=r"`lights\[1\]`: must .* got Surrounding"):
+        dump(Scene(Flat(), 1.0, (), (SUNLIT, found)))
 
 
 def test_a_ready_made_medium_is_that_of_the_library():
@@ -211,6 +291,24 @@ SCENES = {
         (SUNLIT, Sun.at(1.0, 2.0, spectrum.as_spectrum(0.1), 0.0)),
         albedo("snow"),
     ),
+    "lamps and solids": Scene(
+        Flat(),
+        10.0,
+        (),
+        (
+            SUNLIT,
+            Lamp(row(1.0, 2.0, 3.0), SHARE),
+            Spot(row(0.0, 0.1, 7.0), row(0.48, 0.36, -0.8), 2.0, 0.0, 0.3),
+            Spot(row(0.0, 0.1, 7.0), row(0.0, 0.0, 1.0), STAR, 1.0, np.pi),
+        ),
+        0.1,
+        (
+            Surface(Sphere(row(0.0, 0.1, 1.0), 0.3), Lambertian(albedo("sand"))),
+            Surface(Sphere(row(0.0, 5.1, 1.0), 0.7), Glass(1.33)),
+            Surface(Plane(row(9.0, 0.0, 0.0), row(0.6, 0.8, 0.0)), Mirror(SHARE)),
+        ),
+    ),
+    "a lamp alone": Scene(Flat(), 1.0, (), (Lamp(np.zeros(3), sunlight(5.0)),)),
     "no sun": Scene(Flat(), 1 * km, (air(),), ()),
     "another star": Scene(Flat(), 1 * km, (air(),), (Sun.at(1.0, 0.0, STAR),)),
 }
@@ -267,7 +365,8 @@ def test_the_guide_names_every_kind():
     kinds = """exponential tent uniform table standard_atmosphere ball grid isotropic
     rayleigh henyey_greenstein double_henyey_greenstein cornette_shanks draine
     empirical_mie power_law molecules ozone solar height_fog everywhere box file noise
-    puff transformed product blackbody sampled latlong fisheye perspective""".split()
+    puff transformed product blackbody sampled latlong fisheye perspective lamp spot
+    surrounding sphere plane lambertian mirror glass""".split()
     assert all(f'kind = "{x}"' in GUIDE for x in kinds)
     assert parse(GUIDE + TEXT).top == 60e3
 
@@ -328,7 +427,7 @@ PHASE = '{ kind = "rayleigh", depolarisation = 0.0 }'
 PROFILE = '{ kind = "exponential", scale_height = 8000.0 }'
 BAD = [
     ("top = 60e3", "top = 60e3\nhue = 3", "`planet.hue` is not known", "ground_albedo"),
-    ("[planet]", "[plant]", "`plant` is not known", "sun, medium"),
+    ("[planet]", "[plant]", "`plant` is not known", "sun, light, surface"),
     ("radius = 6360e3", "", "`planet.radius` is missing", "m"),
     (
         "radius = 6360e3",
@@ -436,6 +535,26 @@ BAD = [
         "`camera.kind` must be one of latlong, fisheye, perspective",
         "got 'panorama'",
     ),
+    ('kind = "lamp"', 'kind = "lmp"', "`light[0].kind` must be one of lamp", "'lmp'"),
+    ("[1, 2, 3]", "[1, 2]", "`light[0].position` must be a list of length 3", "[1, 2]"),
+    ("= 4.0", "= -4.0", "`light[0].intensity` must be at least 0", "got -4.0"),
+    ("= 4.0", "= 4.0\npower = 3", "`light[0].power` is not known", "intensity"),
+    ("[0, 0.3, -0.4]", "[0, 0, 0]", "`light[1].direction` must point", "[0.0, 0.0"),
+    ("inner = 10", "", "`light[1].inner` is missing", ""),
+    ("inner = 10", "inner = 15", "`light[1].outer` must be above `inner`", "got 15.0"),
+    ("outer = 15", "outer = 181", "`light[1].outer`", "180 or less; got 181"),
+    (
+        '"sphere"',
+        '"ball"',
+        "`surface[0].shape.kind` must be one of sphere, plane",
+        "ll",
+    ),
+    ("radius = 5", "radius = 0", "`surface[0].shape.radius`", "above 0; got 0"),
+    ("[0, 0, 2]", "[0, 0, 0]", "`surface[1].shape.upright` must point", "[0.0, 0.0"),
+    ("albedo = 0.8", "albedo = 1.2", "`surface[0].material.albedo` must be", "1.2"),
+    ("albedo = 0.8", 'albedo = "wood"', "`surface[0].material.albedo`", "got 'wood'"),
+    ("reflectance = 0.6", "reflectance = 2", "`surface[1].material.reflectance`", "2"),
+    ('"mirror"', '"glass"', "`surface[1].material.reflectance` is not known", "index"),
     ("[[medium]]", "[[medium]", "must be TOML", "line"),
     ("[sun]", f"x = {'[' * 3000}", "must be TOML", ""),
 ]

@@ -20,7 +20,7 @@ from ..rays import (
     radiances,
 )
 from ..scenefile import load
-from ..solver import SolvedSky
+from ..solver import admit, SolvedSky
 from ._app import app, numbers_option, refuse
 from ._options import (
     Altitudes,
@@ -36,7 +36,7 @@ from ._options import (
     Zeniths,
 )
 from ._session import progress_bar, start
-from ._world import solve_file, solver_named
+from ._world import of_file, solve_file, solver_named
 
 
 @app.command
@@ -79,15 +79,18 @@ def radiance(
     start(float64)
 
     found = load(scene)
+    method = solver_named(solver, stokes)
+    bands = padded(np.array(wavelength, np.float64 if float64 else np.float32))
     if len(found.suns) != 1:
-        refuse("sun", "must be one alone", f"{len(found.lights)} in '{scene}'")
+        if found.lights:
+            with of_file(found, scene):
+                admit(found, method, bands)
+        refuse("sun", "must be one alone", f"{len(found.suns)} in '{scene}'")
     own, towards = angles(np.asarray(found.suns[0].direction))
     suns = (own,) if sun_zenith is None else sun_zenith
-    method = solver_named(solver, stokes)
     each = bool(method.baked(found).lights)  # solved for each sun
     if bake is not None and len(suns) > 1 and each:
         refuse("--bake", f"serves one sun with --solver {solver}", len(suns))
-    bands = padded(np.array(wavelength, np.float64 if float64 else np.float32))
     axes = [np.array(x) for x in (altitude, view_zenith, azimuth)]
 
     def skies() -> Iterator[SolvedSky]:

@@ -51,7 +51,7 @@ def make_scene(
         if where is None:
             return found
         if len(found.suns) != 1:
-            refuse("sun", "must be one alone to be moved", len(found.lights))
+            refuse("sun", "must be one alone to be moved", len(found.suns))
         towards = direction(*where[:2]).astype(found.suns[0].direction.dtype)
         return eqx.tree_at(lambda x: x.lights[0].direction, found, towards)
     zenith, azimuth, distance = where or (75.0, 40.0, 1.0)
@@ -166,22 +166,34 @@ def solve_file(
 
     With `kept`, from that file if there is one; else there will be.
     """
-    try:
+    with of_file(scene, path):
         if kept is not None and kept.exists():
             return bake.load(kept, scene, solver, bands)
         sky = solve(scene, solver, bands)
         if kept is not None:
             bake.save(sky, kept)
         return sky
+
+
+@contextlib.contextmanager
+def of_file(scene: Scene, path: Path | None) -> Iterator[None]:
+    """Errors about a scene that was read name its file and keys."""
+    # In a file suns come before other lights.
+    suns = len(scene.suns)
+    keys = ["sun"] if suns == 1 else [f"sun[{i}]" for i in range(suns)]
+    keys += [f"light[{i}]" for i in range(len(scene.lights) - suns)]
+    names = {f"scene.lights[{i}]": key for i, key in enumerate(keys)} | {
+        "scene.lights": "sun",
+        "scene.surfaces": "surface",
+        "scene.media": "medium",
+        "scene.ground": "planet.ground_albedo",
+    }
+    try:
+        yield
     except ValueError as error:
         if path is None:
             raise
         text = str(error)
-        for ours, theirs in {
-            "scene.media": "medium",
-            "scene.lights[0]": "sun",
-            "scene.lights": "sun",
-            "scene.ground": "planet.ground_albedo",
-        }.items():
+        for ours, theirs in names.items():
             text = text.replace(ours, theirs)
         raise ValueError(f"{path}: {text}") from error

@@ -2,9 +2,10 @@
 
 Lengths are in m, wavelengths in nm, coefficients in m^-1, angles in degrees. What the
 tables may hold is what the classes here say; their words, and what they mean, are those
-of `atmos.medium`, `atmos.phase` and `atmos.spectrum`.
+of `atmos.medium`, `atmos.phase`, `atmos.light`, `atmos.surface` and `atmos.spectrum`.
 """
 
+from ._guide import GUIDE as GUIDE
 from ._read import (
     load as load,
     load_camera as load_camera,
@@ -12,4 +13,4 @@ from ._read import (
     parse_camera as parse_camera,
 )
 from ._scene import opac as opac
-from ._write import dump as dump, GUIDE as GUIDE
+from ._write import dump as dump

@@ -6,11 +6,14 @@ import numpy as np
 
 from .. import spectrum
 from ..phase._check import check_between
-from ._errors import renamed, under
+from ..quantity import deg
+from ..rays import decimals
+from ._errors import refuse, renamed, under
 
 
 Above0 = Annotated[float, msgspec.Meta(gt=0)]
 AtLeast0 = Annotated[float, msgspec.Meta(ge=0)]
+Turn = Annotated[float, msgspec.Meta(ge=-360, le=360)]
 Wavelength = Annotated[float, msgspec.Meta(ge=100, le=1e5)]
 
 
@@ -53,3 +56,18 @@ def within(
         leading = spectrum.Tabulated(found.knots, found.values)
     check_between(key, leading, low, high)
     return found
+
+
+def unit(key: str, value: tuple[float, float, float]) -> np.ndarray:
+    """The direction that the value of a key points in, whatever its length."""
+    length = np.linalg.norm(value)
+    if length == 0.0:
+        refuse(key, "must point somewhere", list(value))
+    return np.array(value) / length
+
+
+def degrees(angle: object) -> float:
+    """With no more decimals than it takes to make the angle of it again."""
+    wanted = np.asarray(angle)
+    found = math.degrees(float(wanted))
+    return round(found, decimals(lambda n: round(found, n) * deg, wanted))

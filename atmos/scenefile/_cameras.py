@@ -1,4 +1,3 @@
-import math
 from typing import Annotated
 
 import msgspec
@@ -6,14 +5,12 @@ import numpy as np
 
 from .. import camera
 from ..quantity import deg
-from ..rays import decimals
-from ._base import Kind
+from ._base import degrees, Kind, Turn
 from ._profiles import Place
 
 
 # The largest picture is 32768 pixels high.
 Pixels = Annotated[int, msgspec.Meta(ge=1, le=2**15)]
-Turn = Annotated[float, msgspec.Meta(ge=-360, le=360)]
 
 
 class LatLong(Kind, tag="latlong"):
@@ -71,24 +68,17 @@ def written(value: camera.AbstractCamera) -> Camera:
     x, y, z = np.asarray(value.position)
     place = float(x), float(y), float(z)
     if isinstance(value, camera.LatLong):
-        return LatLong(place, value.height, _degrees(value.centre_azimuth))
+        return LatLong(place, value.height, degrees(value.centre_azimuth))
     if isinstance(value, camera.Fisheye):
-        angle, top = map(_degrees, (value.angle_of_view, value.top_azimuth))
+        angle, top = map(degrees, (value.angle_of_view, value.top_azimuth))
         return Fisheye(place, value.height, angle, top)
     if isinstance(value, camera.Perspective):
         return Perspective(
             place,
-            azimuth=_degrees(value.azimuth),
-            elevation=_degrees(value.elevation),
-            field_of_view=_degrees(value.field_of_view),
+            azimuth=degrees(value.azimuth),
+            elevation=degrees(value.elevation),
+            field_of_view=degrees(value.field_of_view),
             height=value.height,
             width=value.width,
         )
     raise ValueError(f"`camera` must be one that a scene file knows; got {value!r}.")
-
-
-def _degrees(angle: object) -> float:
-    """With no more decimals than it takes to make the angle of it again."""
-    wanted = np.asarray(angle)
-    degrees = math.degrees(float(wanted))
-    return round(degrees, decimals(lambda n: round(degrees, n) * deg, wanted))

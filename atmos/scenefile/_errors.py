@@ -34,9 +34,16 @@ def under(key: str) -> Iterator[None]:
 @contextlib.contextmanager
 def renamed(makes: type, keys: Sequence[str]) -> Iterator[None]:
     """Errors about the fields of an object become errors about the keys of a table."""
-    names = dict(zip([x.name for x in dataclasses.fields(makes)], keys, strict=False))
+    names = [x.name for x in dataclasses.fields(makes)]
+    with spelt(dict(zip(names, keys, strict=False))):
+        yield
+
+
+@contextlib.contextmanager
+def spelt(names: dict[str, str]) -> Iterator[None]:
+    """Errors about some names become errors about others."""
     try:
         yield
     except ValueError as error:
         swap = lambda found: f"`{names.get(found[1], found[1])}`"
-        raise ValueError(re.sub(r"`(\w+)`", swap, str(error))) from error
+        raise ValueError(re.sub(r"`([\w.]+)`", swap, str(error))) from error

@@ -1,27 +1,26 @@
 import dataclasses
-from typing import Annotated, Literal
+from collections.abc import Sequence
+from typing import Any, Literal
 
-import msgspec
-
-from .. import gridfile, light, medium, particle, phase, spectrum
+from .. import gridfile, medium, particle, phase, spectrum
 from ..geometry import AbstractGeometry, Flat, Spherical
-from ..particle import aerosol, surface
-from ..quantity import deg
-from ..rays import direction
+from ..particle import aerosol
 from ..scene import air, haze, ozone, Scene
 from ._base import Above0, AtLeast0, build, Table, within
 from ._cameras import Camera
 from ._errors import refuse, under
+from ._lights import Light, Sun
 from ._phases import Phase
 from ._profiles import Blackbody, File as GridFile, located, Profile
-from ._spectra import Constant, Molecules, Ozone, PowerLaw, Solar, Spectrum, Tabulated
+from ._spectra import Molecules, Ozone, Spectrum
+from ._surfaces import Albedo, albedo, Surface
 
 
 class Planet(Table, kw_only=True):
     shape: Literal["spherical", "flat"]
     radius: Above0 | None = None
     top: Above0
-    ground_albedo: float | str | Constant | PowerLaw | Tabulated = 0.0
+    ground_albedo: Albedo = 0.0
 
     def geometry(self) -> AbstractGeometry:
         if self.shape == "flat":
@@ -31,28 +30,6 @@ class Planet(Table, kw_only=True):
         if self.radius < self.top:
             refuse("radius", f"must be above `top`, {self.top} m", self.radius)
         return Spherical(self.radius)
-
-    def ground(self) -> spectrum.AbstractSpectrum:
-        if not isinstance(self.ground_albedo, str):
-            return within("ground_albedo", self.ground_albedo, 0.0, 1.0)
-        if self.ground_albedo not in surface.NAMES:
-            names = ", ".join(surface.NAMES)
-            refuse("ground_albedo", f"must be one of {names}", self.ground_albedo)
-        return surface.albedo(self.ground_albedo)
-
-
-class Sun(Table, kw_only=True):
-    zenith: Annotated[float, msgspec.Meta(ge=0, le=180)]
-    azimuth: float = 0.0
-    irradiance: Spectrum | Solar
-    angular_radius: Annotated[float, msgspec.Meta(ge=0, lt=90)] = (
-        light.SOLAR_RADIUS / deg
-    )
-
-    def build(self) -> light.Sun:
-        irradiance = within("irradiance", self.irradiance, 0.0)
-        towards = direction(self.zenith, self.azimuth)
-        return light.Sun(towards, irradiance, self.angular_radius * deg)
 
 
 class Medium(Table):
@@ -160,25 +137,35 @@ class Medium(Table):
 
 
 class File(Table):
+    """Suns come before other lights in what it makes."""
+
     planet: Planet
-    sun: Sun | list[Sun]
+    sun: Sun | list[Sun] | None = None
+    light: list[Light] = []
+    surface: list[Surface] = []
     medium: list[Medium] = []
     camera: Camera | None = None
 
     def build(self) -> Scene:
-        suns = {"sun": self.sun}
-        if isinstance(self.sun, list):
-            suns = {f"sun[{i}]": x for i, x in enumerate(self.sun)}
-        media = {f"medium[{i}]": x for i, x in enumerate(self.medium)}
         with under("planet"):
-            geometry, ground = self.planet.geometry(), self.planet.ground()
-        return Scene(
-            geometry,
-            self.planet.top,
-            tuple(found for key, x in media.items() for found in build(key, x)),
-            tuple(build(key, x) for key, x in suns.items()),
-            ground,
-        )
+            geometry = self.planet.geometry()
+            ground = albedo("ground_albedo", self.planet.ground_albedo)
+        media = tuple(x for found in _each("medium", self.medium) for x in found)
+        lights = (*self._suns(), *_each("light", self.light))
+        shines = lights or any(x.emission is not None for x in media)
+        if self.sun is None and not shines:
+            refuse("sun", "is missing, and nothing else shines; sun = [] says so")
+        surfaces = _each("surface", self.surface)
+        return Scene(geometry, self.planet.top, media, lights, ground, surfaces)
+
+    def _suns(self) -> tuple[Any, ...]:
+        if isinstance(self.sun, list):
+            return _each("sun", self.sun)
+        return () if self.sun is None else (build("sun", self.sun),)
+
+
+def _each(key: str, tables: Sequence[Table]) -> tuple[Any, ...]:
+    return tuple(build(f"{key}[{i}]", x) for i, x in enumerate(tables))
 
 
 def opac(
