@@ -16,6 +16,7 @@ from atmos.quantity import versine
 from atmos.scene import Scene
 from atmos.solver import Columns, SingleScattering, solve
 from atmos.solver._peaks import Peaks
+from atmos.solver._sight import sight
 
 
 NM = np.array([500.0])
@@ -202,7 +203,8 @@ def test_light_that_turned_in_peaks_alone_is_summed_up_in_closed_form():
                 for x in (peaks.within, peaks.without)
             ]
             lobe = HenyeyGreenstein(g).evaluate(versine(view, light.direction), nm)
-            more = peaks.scattered(scene, light, nm, place, view, pieces=12)
+            line = sight(scene, place, view, peaks.without.extinction, 12)
+            more = peaks.scattered(scene, light, nm, line)
             return more[0] + lobe[0] * (once[0] - once[1])
 
         return jax.vmap(look)(views)

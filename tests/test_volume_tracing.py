@@ -159,6 +159,7 @@ def test_nothing_is_denser_than_its_bound():
 
 
 def test_a_ray_meets_as_much_as_lies_in_its_cells():
+    rng = np.random.default_rng(0)  # whatever was drawn before
     bounds = rng.uniform(0.0, 1.0, (6, 6, 6)) ** 3
     bounds[bounds < 0.1] = 0.0
     cells = Cells(*map(jnp.asarray, (LOWER, UPPER, bounds)))

@@ -79,7 +79,6 @@ class SingleScattering(AbstractSolver):
         hands in less than the media's own.
         """
         path, far, grounded = enter(scene, position, direction)
-        to_light = lambda point: self._to_light(scene, light, point)
         irradiance = light.irradiance.evaluate(wavelength)
 
         seen = self._seen(scene, path, far, extinction)
@@ -88,13 +87,19 @@ class SingleScattering(AbstractSolver):
         # Crowd the places at both ends of a piece: one is thicker, the other nearer.
         places = begin[:, None] + length[:, None] * (u * u * (3.0 - 2.0 * u))[None]
         slope = length[:, None] * (6.0 * u * (1.0 - u))[None]
-        points = jax.vmap(path.at)(jnp.append(places.ravel(), far))
-        # Where the ray ends on the ground it has no digits to lose.
-        height = points.altitude.at[-1].set(0.0)
-        points = Point(points.position, height, points.up)
-        known = jax.vmap(lambda x: (densities(scene, x), to_light(x)))(points)
+
+        def at(place, last):
+            point = path.at(place)
+            # Where the ray meets the ground it has no digits to lose.
+            altitude = jnp.where(last, 0.0, point.altitude)
+            point = Point(point.position, altitude, point.up)
+            rise = jnp.dot(point.up, light.direction)
+            return densities(scene, point), self._to_light(scene, light, point), rise
+
+        every = jnp.append(places.ravel(), far)
+        known = jax.vmap(at)(every, jnp.arange(every.size) == places.size)
         cells = lambda x: x[:-1].reshape(*places.shape, x.shape[-1])
-        found, sunwards = (cells(x) for x in known)
+        found, sunwards = (cells(x) for x in known[:2])
         steps = found * slope[:, :, None]
         within = contract(
             "ij,pjm->pim", jnp.asarray(cumulative(self.nodes), far.dtype), steps
@@ -115,7 +120,7 @@ class SingleScattering(AbstractSolver):
 
         passed = jnp.sum(whole, 0) + known[1][-1]
         arrives = jnp.exp(-contract("m,ml->l", passed, extinction))
-        rise = jnp.maximum(jnp.dot(points.up[-1], light.direction), 0.0)
+        rise = jnp.maximum(known[2][-1], 0.0)
         albedo = scene.ground.evaluate(wavelength)
         ground = albedo / math.pi * rise * arrives * irradiance
         return jnp.stack([*air, jnp.where(grounded, ground, 0.0)])
