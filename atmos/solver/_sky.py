@@ -1,6 +1,8 @@
 """A solved scene as a sky, and as a panorama from one place."""
 
 import math
+import os
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import equinox as eqx
@@ -160,9 +162,13 @@ def _tabulate(sky: SolvedSky, position: Position, resolution: Resolution) -> Pan
             along = lambda y: jax.lax.map(lambda x: block(x, y), zenith)
             found = jax.lax.map(along, azimuth)
         else:
-            found = jnp.stack(
-                [jnp.stack([look(x, y) for x in zenith]) for y in azimuth]
-            )
+            blocks = [(x, y) for y in azimuth for x in zenith]
+            # The first compiles what the others, on as many cores as there are, use.
+            first = look(*blocks[0])
+            with ThreadPoolExecutor(os.cpu_count()) as pool:
+                rest = pool.map(lambda x: look(*x), blocks[1:])
+                found = jnp.stack([first, *rest])
+            found = found.reshape(len(azimuth), len(zenith), *found.shape[1:])
         found = jnp.moveaxis(found, 0, 2)
         found = found.reshape(zenith.size, azimuth.size, *found.shape[4:])
         return found[:rings, :around]
