@@ -241,6 +241,7 @@ def test_light_that_is_never_absorbed_comes_to_an_end():
 
 def test_gradients_are_those_of_differences():
     # How dense it is, how white, and how far ahead it scatters; the bounds stay.
+    rng = np.random.default_rng(0)  # whatever was drawn before
     at = jnp.array([1.0, 0.9, 0.5], jnp.float32)
     solver = dataclasses.replace(SOLVER, slack=2.0)
     nm = jnp.asarray(NM, jnp.float32)

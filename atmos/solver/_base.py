@@ -8,12 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, PyTree
 
 from ..light import AbstractLight, Sun
-from ..quantity import (
-    Direction,
-    Position,
-    Radiance,
-    Wavelength,
-)
+from ..quantity import Direction, Position, Radiance, Wavelength
 from ..scene import Scene
 
 

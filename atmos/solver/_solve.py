@@ -8,10 +8,7 @@ from jax.core import Tracer
 from jaxtyping import ArrayLike
 
 from ..light import Sun
-from ..quantity import (
-    as_float,
-    Wavelength,
-)
+from ..quantity import as_float, Wavelength
 from ..scene import Scene
 from ._base import AbstractSolver
 from ._sky import SolvedSky
