@@ -48,7 +48,9 @@ class Suns(eqx.Module):
     def _between(
         self, azimuth: Float[Array, "ray azimuth sun"]
     ) -> tuple[
-        Int[Array, "ray azimuth sun 4"], Float[Array, "..."], Float[Array, "..."]
+        Int[Array, "ray azimuth sun 4"],
+        Float[Array, "ray azimuth sun 4"],
+        Float[Array, "ray azimuth sun 4"],
     ]:
         """Which azimuths to mix, how much of each, and on which side."""
         count = self.azimuths

@@ -161,24 +161,21 @@ class Sweep(eqx.Module):
         """
         count, k = self.turned.shape[1], self.polarised.shape[1]
         travels = jnp.stack([-cosine, cosine])
-        around = lambda wave, m: jnp.asarray(
-            wave(np.multiply.outer(self._azimuths(), m)), cosine.dtype
+        multiples = lambda m: jnp.multiply.outer(
+            self.suns.azimuth(), jnp.asarray(m, cosine.dtype)
         )
-        spread = lambda x, wave, m: x[:, :, None] * around(wave, m)[None, None]
+        spread = lambda x, wave, m: x[:, :, None] * wave(multiples(m))[None, None]
         l, m = pairs(count)
-        p = spread(harmonics(travels, count)[..., l, m], np.cos, m)
+        p = spread(harmonics(travels, count)[..., l, m], jnp.cos, m)
         if self.stokes == 1:
             return p[:, None]
         l, m = pairs(k)
         r, s = (x[..., l, m] for x in spin_harmonics(travels, k))
-        q = [spread(x, np.cos, m) for x in (r, s)]
-        u = [spread(x, np.sin, m) for x in (s, r)]
+        q = [spread(x, jnp.cos, m) for x in (r, s)]
+        u = [spread(x, jnp.sin, m) for x in (s, r)]
         zero = jnp.zeros_like
         rows = [p, zero(q[0]), zero(q[1])], [zero(p), *q], [zero(p), *u]
         return jnp.stack([jnp.concatenate(x, -1) for x in rows], 1)
-
-    def _azimuths(self) -> np.ndarray:
-        return (np.arange(self.suns.azimuths) + 0.5) * (math.pi / self.suns.azimuths)
 
     def _gathered(
         self,

@@ -39,7 +39,8 @@ class Shells(AbstractDiffuse):
     sum, until it is right to `tolerance`; a solution that is not after `orders` steps
     is refused. Phase functions are without their forward peaks (delta-M,
     Wiscombe 1977), but for light that turned once, which is added with them (Nakajima
-    and Tanaka 1988). A line of sight takes `nodes` places in each of `pieces` pieces.
+    and Tanaka 1988), and what peaks alone turned more than once. A line of sight takes
+    `nodes` places in each of `pieces` pieces.
 
     Raises `ValueError` for a flat world, where a medium does not depend on altitude
     alone, where media have more edges than there are layers, and where `tolerance` is
