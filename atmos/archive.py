@@ -4,7 +4,7 @@ The file is a NumPy archive (.npz) without pickled objects, which any NumPy read
 holds arrays, and `header`, the bytes of a JSON text in UTF-8:
 
     format   "atmos bake", or what else it is
-    version  that of the layout, 1
+    version  that of the layout of its kind, such as 2
     atmos    the version of atmos that made it
     made     what it was made of, by the way to it: `solver.streams`, `wavelength`,
              `scene.media[0].profile.scale_height`. Arrays with type, shape and numbers;
