@@ -38,10 +38,11 @@ Output = Annotated[
     Path | None, option("The CSV file to write; standard output without it.")
 ]
 Precise = Annotated[bool, option("Calculate in double precision.")]
-SOLVERS = Literal["shells", "columns", "shared", "single", "march"]
+SOLVERS = Literal["shells", "columns", "bruneton", "shared", "single", "march"]
 HOW = (
     "How: shells for all orders of scattering in the round, for any sun; columns for "
     "all orders, each column of air taken as flat (suns well above the horizon); "
+    "bruneton for the first few orders, in tables (not for thick air); "
     "shared for all orders, those after the first roughly (quick, not for thick air); "
     "single for light that turned once; march for that in clouds, smoke and fire, by "
     "steps along every ray."
