@@ -230,7 +230,7 @@ AIR = THICK, THICK, SHARE, SHARE, decades(1e6, 1e8, RADIUS), within(-0.9, 0.9, 0
 EYES = rows(3, ANGLE, decades(1e-3, 1e8, 0.0, TOP))
 
 
-@drawn(10)
+@drawn(6)
 @given(*AIR, EYES)
 def test_random_skies_are_bright_and_have_slopes_or_are_refused(
     depth, haze, white, ground, radius, g, eyes
@@ -251,7 +251,7 @@ def test_random_skies_are_bright_and_have_slopes_or_are_refused(
             assert np.all(np.isfinite(look_up(sky, views, at, jnp.ones(2))))
 
 
-@drawn(3)
+@drawn(2)
 @given(*AIR)
 def test_random_airs_have_slopes(depth, haze, white, ground, radius, g):
     at = jnp.array([depth, haze, white, ground, radius, g])
