@@ -5,6 +5,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from hostile import decades, drawn, rows, within
+from hypothesis import given
 
 from atmos.geometry import Flat, Spherical
 from atmos.light import Sun
@@ -289,3 +291,17 @@ def test_what_cannot_be_traced_is_refused():
     sky = solve(slab(1.0, 1.0, 0.0, 0.5).scene, SingleScattering(), CASES)
     with pytest.raises(ValueError, match="`sky` must be traced by paths"):
         estimate(sky, jnp.zeros(3), jnp.array([0.0, 0.0, 1.0]))
+
+
+SHARE, LOBE = within(0.0, 1.0), within(-0.99, 0.99, 0.0)
+SUN = within(1e-3, 1.0)
+
+
+@drawn(6)
+@given(rows(3, decades(1e-9, 4.0, 0.0), SHARE, LOBE, SHARE), SUN, within(-1.0, 1.0))
+def test_random_slabs_are_bright(cases, sun, cosine):
+    depth, albedo, g, ground = cases.T
+    sky = slab(depth, albedo, g, sun, ground)
+    for altitude in (0.0, 0.5):
+        value, error = radiance(sky, altitude, cosine)
+        assert np.all(np.isfinite(value) & (value >= 0.0) & np.isfinite(error))

@@ -8,6 +8,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from hostile import decades, drawn, rows, within
+from hypothesis import given
 from scipy.interpolate import CubicSpline
 
 from atmos.geometry import Flat, Spherical
@@ -233,3 +235,30 @@ def test_a_fixed_point_solves_its_equations():
     due = np.linalg.solve(np.eye(30) - np.asarray(matrix), first.T[..., None])[..., 0].T
     np.testing.assert_allclose(found, due, rtol=1e-8)
     assert np.all(error <= 1e-10)
+
+
+DEPTH, SHARE = decades(1e-9, 10.0, 0.0), within(0.0, 1.0)
+ANGLE = within(0.0, math.pi, 0.5 * math.pi, 0.5 * math.pi + 0.1)
+PLANET = decades(1e6, 1e8, RADIUS)
+
+
+# Small: to be bright, not exact.
+SMALL = Shells(layers=8, grounded=4, azimuths=4, degrees=4, suns=24, tolerance=1e-3)
+
+
+@drawn(4)
+@given(DEPTH, DEPTH, SHARE, SHARE, PLANET, rows(4, ANGLE, decades(1e-3, 1e8, 0.0, TOP)))
+def test_random_skies_are_bright_or_refused(depth, haze, white, ground, radius, looks):
+    """One solution serves all suns and eyes."""
+    given = dict(depth=depth, haze=haze, white=white, ground=ground, radius=radius)
+    try:
+        sky = solve(numbers(**given), SMALL, NM)
+    except ValueError as refused:
+        assert "`tolerance` must be reached" in str(refused)
+        return
+    for zenith, altitude in looks:
+        for views in (VIEWS, BELOW):
+            seen = np.asarray(see(sky, jnp.array(zenith), views, jnp.array(altitude)))
+            assert np.all(np.isfinite(seen)), (zenith, altitude)
+            # By night cubics swing below nothing, by less than a sun of 1 leaves there.
+            assert np.all(seen >= -1e-15), (zenith, altitude, seen)

@@ -14,7 +14,7 @@ import matplotlib.pyplot as plt  # noqa: E402
 
 # What is ours is filled and in strong colours; what is others' is open.
 OURS = {"single": "#d62728", "shared": "#ff7f0e", "columns": "#1f77b4"}
-OURS |= {"shells": "#2ca02c"}
+OURS |= {"shells": "#2ca02c", "bruneton": "#e7298a"}
 OTHERS = {
     "Preetham": ("#8c564b", "v"),
     "Hosek": ("#e377c2", "^"),

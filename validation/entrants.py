@@ -30,6 +30,7 @@ from atmos.geometry import Flat
 from atmos.sky import AbstractFittedSky, AbstractSky, Clamp, Hosek, Preetham
 from atmos.solver import (
     AbstractSolver,
+    Bruneton,
     Columns,
     QUICK,
     Shared,
@@ -376,6 +377,21 @@ def ours(quick: bool) -> Iterator[AbstractEntrant]:
         coarse = Shared(layers=16, suns=16, pieces=6, single=QUICK)
         yield Solver("shared", "16 layers", coarse)
     yield Solver("shared", "32 layers", Shared())
+    coarse = Bruneton(
+        layers=16,
+        views=10,
+        azimuths=6,
+        suns=24,
+        orders=5,
+        degrees=8,
+        steps=10,
+        single=QUICK,
+    )
+    yield Solver("bruneton", "16 layers, 5 orders", coarse)
+    yield Solver("bruneton", "32 layers, 6 orders", Bruneton())
+    if not quick:
+        fine = Bruneton(layers=48, views=24, azimuths=12, suns=64, orders=8, degrees=16)
+        yield Solver("bruneton", "48 layers, 8 orders", fine)
     coarse = Columns(streams=8, layers=30, suns=8, pieces=8, nodes=2, single=QUICK)
     yield Solver("columns", "8 streams, 30 layers", coarse)
     for streams in [16, 32] if quick else [8, 16, 32]:

@@ -34,7 +34,7 @@ from ._view import View
 from ._world import about, make_scene, solve_file, solver_named
 
 
-_SOLVERS = ("single", "shared", "columns", "shells")
+_SOLVERS = ("single", "shared", "bruneton", "columns", "shells")
 
 
 @app.command
@@ -69,9 +69,9 @@ def compare(
 ) -> None:
     """Two skies and their relative difference, side by side, with numbers.
 
-    Each is an OpenEXR file, a solver (single, shared, columns, shells) or a model
-    (preetham, hosek, hosek-rgb, cie, perez). Skies that are not files are made with the
-    options below, without the sun's disk.
+    Each is an OpenEXR file, a solver (single, shared, bruneton, columns, shells) or a
+    model (preetham, hosek, hosek-rgb, cie, perez). Skies that are not files are made
+    with the options below, without the sun's disk.
 
     For example:
 

@@ -39,14 +39,14 @@ Output = Annotated[
 ]
 Precise = Annotated[bool, option("Calculate in double precision.")]
 Solver = Annotated[
-    Literal["shells", "columns", "shared", "single", "march"] | None,
+    Literal["shells", "columns", "bruneton", "shared", "single", "march"] | None,
     option(
         "How: shells for all orders of scattering in the round, for any sun; columns "
         "for all orders, each column of air taken as flat (suns well above the "
-        "horizon); shared for all orders, those after the first roughly (quick, not "
-        "for thick air); single for light that turned once; march for that in clouds, "
-        "smoke and fire, by steps along every ray.  [default: shared; with --stokes 3 "
-        "single]"
+        "horizon); bruneton for the first few orders, in tables (not for thick air); "
+        "shared for all orders, those after the first roughly (quick, not for thick "
+        "air); single for light that turned once; march for that in clouds, smoke and "
+        "fire, by steps along every ray.  [default: shared; with --stokes 3 single]"
     ),
 ]
 Bake = Annotated[

@@ -18,6 +18,7 @@ from ..scenefile import load, opac
 from ..solver import (
     AbstractSolver,
     AbstractTracing,
+    Bruneton,
     Columns,
     Fixed,
     PathTracing,
@@ -131,13 +132,13 @@ def solver_named(
         return Columns(single=single, stokes=stokes)
     if name == "shells":
         return Shells(single=single, stokes=stokes)
+    if name in ("bruneton", "shared", "march") and stokes != 1:
+        refuse("--stokes", f"must be 1 with --solver {name}", stokes)
+    if name == "bruneton":
+        return Bruneton(single=single)
     if name == "shared":
-        if stokes != 1:
-            refuse("--stokes", "must be 1 with --solver shared", stokes)
         return Shared(single=single)
     if name == "march":
-        if stokes != 1:
-            refuse("--stokes", "must be 1 with --solver march", stokes)
         return RayMarching(Fixed(256), ShadowCache(96))
     return dataclasses.replace(single, stokes=stokes)
 

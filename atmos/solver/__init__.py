@@ -20,6 +20,7 @@ from ._tally import (
     estimates as estimates,
     Tally as Tally,
 )
+from .bruneton import Bruneton as Bruneton
 from .columns import Columns as Columns
 from .path_tracing import PathTracing as PathTracing
 from .ray_marching import RayMarching as RayMarching

@@ -12,7 +12,7 @@ from ..quantity import Direction, Irradiance, Number, Position, Wavelength
 from ..scene import Scene
 from ..transport import columns, contract, extinctions
 from ._base import AbstractSolver
-from ._field import Field
+from ._field import AbstractField
 from ._peaks import Peaks
 from ._sight import sight
 from .single_scattering import SingleScattering
@@ -25,7 +25,7 @@ class Diffused(eqx.Module):
     `peaks` these are taken as not scattered at all.
     """
 
-    field: Field
+    field: AbstractField
     peaks: Peaks | None
     error: Number
 

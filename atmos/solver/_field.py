@@ -1,5 +1,6 @@
 """Diffuse light as a field of moments, and what of it one sees along a line."""
 
+import abc
 import dataclasses
 import math
 
@@ -24,12 +25,41 @@ from ._towards import Travel, travel, turned, waves
 _FEW, _MORE = 12, 36
 
 
-class Field(eqx.Module):
+class AbstractField(eqx.Module):
+    """Light that turned more than once, or that is about to, as solvers find it.
+
+    `mixture` are the media without their forward peaks, which the light does not
+    notice.
+    """
+
+    mixture: eqx.AbstractVar[Mixture]
+
+    @abc.abstractmethod
+    def fluxes(self, light: Sun, point: Point) -> tuple[Depth, Depth]:
+        """Diffuse flux upwards and downwards, for a light of irradiance 1."""
+
+    @abc.abstractmethod
+    def gather(
+        self,
+        scene: Scene,
+        light: Sun,
+        towards: Float[Array, "light 3"],
+        wavelength: Wavelength,
+        sight: Sight,
+        *,
+        nodes: int,
+    ) -> Float[Array, "light stokes wl"]:
+        """Light of more than one turn from along a line of sight, and from its end.
+
+        Of a light that stands in one of several directions.
+        """
+
+
+class Field(AbstractField):
     """The moments of diffuse light over altitude, from the ground up, and suns.
 
     Of a light of irradiance 1, relative to the exponential of `reference`; `moments` as
-    of `_ordinates.Diffuse`. `mixture` are the media without their forward peaks, which
-    the light does not notice. With `stokes` 3 it is I, Q and U that one sees.
+    of `_ordinates.Diffuse`. With `stokes` 3 it is I, Q and U that one sees.
     """
 
     mixture: Mixture
@@ -42,7 +72,6 @@ class Field(eqx.Module):
     stokes: int = eqx.field(static=True, default=1)
 
     def fluxes(self, light: Sun, point: Point) -> tuple[Depth, Depth]:
-        """Diffuse flux upwards and downwards, for a light of irradiance 1."""
         first, by_sun = self.suns.between(
             light, zenith_angle(point.up, light.direction)
         )
@@ -62,11 +91,7 @@ class Field(eqx.Module):
         *,
         nodes: int,
     ) -> Float[Array, "light stokes wl"]:
-        """Light of more than one turn from along a line of sight, and from its end.
-
-        Of a light that stands in one of several directions. The line's vertical plane
-        is the same everywhere, so that Q and U simply add.
-        """
+        # The line's vertical plane is the same everywhere, so that Q and U simply add.
         path, length = sight.path, sight.length
         u, w = (jnp.asarray(x, length.dtype) for x in gauss_legendre(nodes))
         inner = jnp.asarray(cumulative(nodes), length.dtype)

@@ -83,7 +83,7 @@ def turns(
         )
         left = jnp.exp(-depth)
         dark = jax.vmap(jax.vmap(lambda x: path.shadow(x, jnp.zeros_like(cosine))))
-        lit = _lit(begin, length, dark(suns))
+        lit = lit_share(begin, length, dark(suns))
         once = contract("psa,psal,pl->sl", lit, left[:-1], turned)
         ground = jnp.where(line.grounded, jnp.exp(-passed), 0.0)
         bounced = contract("sa,sal->sl", jnp.maximum(rises[-1], 0.0), left[-1])
@@ -134,7 +134,7 @@ def _steps(
     return turned, passed[-1]
 
 
-def _lit(
+def lit_share(
     begin: Float[Array, "piece"],
     length: Float[Array, "piece"],
     dark: Float[Array, "sun turn 2"],
