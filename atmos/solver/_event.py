@@ -6,6 +6,7 @@ found for it. That is unbiased (detached sampling: Zeltner, Speierer, Georgiev a
 """
 
 import dataclasses
+import math
 
 import equinox as eqx
 import jax
@@ -28,6 +29,10 @@ from ._walk import weigh
 
 # Below this share of what it had, a path or a beam is given up by chance.
 _FAINT = 0.1
+# A beam to what shines from beyond is always sent where a path turns first, and where so
+# many times as much turns its way as if all ways were alike. Else it is so in proportion,
+# but never more seldom than this.
+_OFTEN, _SELDOM = 4.0, 0.05
 # The density, per sr, with which a smooth surface sends light on.
 _SHARP = 1e15
 
@@ -35,7 +40,9 @@ _SHARP = 1e15
 def proceed(quest: Quest, trip: Trip) -> Trip:
     """On to the next collision, real or null, to the ground or out."""
     key, own = jax.random.split(jax.random.fold_in(as_key(trip.key), trip.step + 1))
-    u = settled(jax.random.uniform(key, (9,), quest.wavelength.dtype), quest.wavelength)
+    u = settled(
+        jax.random.uniform(key, (10,), quest.wavelength.dtype), quest.wavelength
+    )
     place = settled(meet(quest, trip, u[:2]), quest.wavelength)
     path = ~trip.beaming & ~trip.ended
     seen = _seen(quest, trip, place)
@@ -122,7 +129,7 @@ def _light_up(
     bend: Bend,
     weight: Float[Array, "wl"],
     ratio: Float[Array, "wl"],
-    u: Float[Array, "2"],
+    u: Float[Array, "3"],
 ) -> tuple[Shine, Float[Array, "wl"]]:
     """Where to look for the light from where a path turns, and what it may add."""
     nm = quest.wavelength
@@ -130,10 +137,16 @@ def _light_up(
         far = jnp.full_like(trip.bright, FAR)
         dark = jnp.zeros_like(nm)
         return Shine(bend.onward, far, dark, jnp.zeros_like(far)), dark
-    shine = quest.light.sample(bend.point.position, u, nm)
+    shine = quest.light.sample(bend.point.position, u[:2], nm)
     share = falls(quest, bend, shine.direction)
     apt = jnp.mean(ratio * stop_gradient(share)) * shine.solid_angle
     beam = weight * share * shine.irradiance / (1.0 + apt)
+    # Where little light turns this way beams are seldom sent, and weigh more.
+    even = jnp.max(share) * (4.0 * math.pi / _OFTEN)
+    sent = jnp.clip(stop_gradient(even), _SELDOM, 1.0)
+    always = (shine.distance < FAR) | (trip.order == 0)
+    sent = jnp.where(always, 1.0, sent)
+    beam = jnp.where(u[2] < sent, beam / sent, 0.0)
     # What a smooth surface shows is never found on purpose.
     return shine, jnp.where(bend.smooth, 0.0, beam)
 

@@ -11,6 +11,7 @@ from ..quantity import Number
 from ..transport import densities
 from ._majorants import cross, fly
 from ._ray import total
+from ._settled import settled
 from ._strata import climb
 from ._trip import Leg, Quest, Trip
 
@@ -51,7 +52,8 @@ def meet(quest: Quest, trip: Trip, u: Float[Array, "2"]) -> Meeting:
         at, bound = jnp.where(nearer, near, at), jnp.where(nearer, most * lift, bound)
         airy = airy & nearer
         met = jnp.where(nearer, airy, met)
-    point = path.at(at)
+    at, bound, met, airy = settled((at, bound, met, airy), quest.wavelength)
+    point = settled(path.at(at), quest.wavelength)
     own = jnp.array([x.profile.layered for x in quest.scene.media], bool) == airy
     here = jnp.where(own, densities(quest.scene, point), 0.0)
     mixture = here[:, None] * quest.scattering
