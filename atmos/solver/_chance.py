@@ -37,8 +37,8 @@ def _seed(seed: Integer[Array, ""]) -> Words:
     return _fold_in(jnp.zeros(2, jnp.uint32), seed.astype(jnp.uint32))
 
 
-def _fold_in(key: Words, word: Word) -> Words:
-    return jnp.stack(stirred(key[0], key[1], word, jnp.uint32(_KEY))[:2])
+def _fold_in(key: Words, word: Word | int) -> Words:
+    return jnp.stack(stirred(key[0], key[1], jnp.uint32(word), jnp.uint32(_KEY))[:2])
 
 
 def _split(key: Words, shape: tuple[int, ...]) -> UInt32[Array, "*n 2"]:

@@ -29,9 +29,9 @@ from ._walk import weigh
 
 # Below this share of what it had, a path or a beam is given up by chance.
 _FAINT = 0.1
-# A beam to what shines from beyond is always sent where a path turns first, and where so
-# many times as much turns its way as if all ways were alike. Else it is so in proportion,
-# but never more seldom than this.
+# A beam to what lies beyond the world is always sent where a path turns first, and
+# where so many times as much turns its way as if all ways were alike. Else it is sent
+# in proportion, but never more seldom than this.
 _OFTEN, _SELDOM = 4.0, 0.05
 # The density, per sr, with which a smooth surface sends light on.
 _SHARP = 1e15
