@@ -13,9 +13,15 @@ from rich.progress import Progress
 from ..reference import cache_folder
 
 
-def start(double: bool = False) -> None:
-    """Readies JAX: it keeps what it compiles, if there is a place to."""
+# XLA's newer emitters for CPUs compile twice as long, for code that is no faster.
+QUICK_TO_COMPILE = "--xla_cpu_use_fusion_emitters=false"
 
+
+def start(double: bool = False) -> None:
+    """Readies JAX: it compiles quickly, and keeps it, if there is a place to."""
+    flags = os.environ.get("XLA_FLAGS", "")
+    if "xla_cpu_use_fusion_emitters" not in flags:
+        os.environ["XLA_FLAGS"] = f"{flags} {QUICK_TO_COMPILE}".strip()
     folder = cache_folder() / "jax"
     with contextlib.suppress(OSError):
         folder.mkdir(parents=True, exist_ok=True)
