@@ -127,7 +127,7 @@ def expose(
 
     for number, found in _in_turn(seen, round(film.looks * len(tallies))):
         which = number % len(tallies)
-        tallies[which] = _join(tallies[which], found)
+        tallies[which] = jax.block_until_ready(_join(tallies[which], found))
         yield dataclasses.replace(film, tallies=tuple(tallies))
 
 
@@ -135,21 +135,19 @@ def _in_turn(work: Callable[[int], Array], first: int) -> Iterator[tuple[int, Ar
     """What is worked out for one number after the other, without end."""
     # The first compiles what the others use.
     yield first, work(first)
-    workers = os.cpu_count() if jax.default_backend() == "cpu" else None
-    pool, ahead = ThreadPoolExecutor(workers or 1), collections.deque()
+    workers = (os.cpu_count() or 1) if jax.default_backend() == "cpu" else 1
+    pool, ahead = ThreadPoolExecutor(workers), collections.deque()
     try:
         for number in itertools.count(first + 1):
             ahead.append((number, pool.submit(work, number)))
-            if len(ahead) > (workers or 1):
+            if len(ahead) > workers:
                 done, found = ahead.popleft()
                 yield done, found.result()
     finally:
         pool.shutdown(wait=False, cancel_futures=True)
 
 
-@eqx.filter_jit
-def _join(tally: Tally, seen: Float[Array, "pixel channel"]) -> Tally:
-    return tally.join(Tally.of(seen[None]))
+_join = eqx.filter_jit(lambda tally, seen: tally.join(Tally.of(seen[None])))
 
 
 @eqx.filter_jit

@@ -95,9 +95,8 @@ class VolumeTracing(AbstractTracing):
         cells = None
         if clouds.media:
             cells = cells_of(clouds, wavelength, self.cells, slack)
-        return Majorants(
-            cells, strata_of(air, wavelength, slack) if air.media else None
-        )
+        strata = strata_of(air, wavelength, slack) if air.media else None
+        return Majorants(cells, strata)
 
     def scattered(
         self,
@@ -177,9 +176,8 @@ def _tally(
     first: Integer[Scalar, ""],
     blocks: Integer[Scalar, ""],
 ) -> Tally:
-    own = jax.vmap(lambda *look: of_look(quick(solver.key), *look))(
-        positions, directions
-    )
+    key = quick(solver.key)
+    own = jax.vmap(lambda *look: of_look(key, *look))(positions, directions)
     looks, count = positions.shape[0], max(quest.wavelength.shape[0], 1)
     each = solver.walks, solver.paths, looks
 
