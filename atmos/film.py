@@ -109,8 +109,7 @@ def expose(
 ) -> Iterator[Film]:
     """Looks at the sky through the film's camera, again and again without end.
 
-    Gives the film after each stretch of pixels. On a CPU those to come are worked on
-    meanwhile, on as many cores as there are.
+    Gives the film after each stretch of pixels; all cores of a CPU work on the next.
     """
     if response is not None:
         response = response.astype(sky.wavelength.dtype)
