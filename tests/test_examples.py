@@ -4,6 +4,7 @@ import importlib.util
 import pathlib
 import re
 
+import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -27,7 +28,7 @@ def load(name):
 def test_skies(tmp_path):
     skies = load("skies")
     # By day and by light that turned once: the others are the same lines of code.
-    day = ["noon", "sunset", "mars", "orbit"]
+    day = ["noon", "mars", "orbit"]
     wanted = [x for x in skies.skies(8) if x[0] in day]
     pictures = skies.main(tmp_path, wanted, QUICK)
     assert {x.stem for x in tmp_path.iterdir()} == {*pictures, "skies"}
@@ -37,7 +38,7 @@ def test_skies(tmp_path):
 
     _, scene, camera = next(x for x in skies.skies(8) if x[0] == "noon")
     (sun,), nm = scene.lights, skies.WAVELENGTH.astype(float)
-    beam = direct_irradiance(scene, sun, camera.position, nm)
+    beam = eqx.filter_jit(direct_irradiance)(scene, sun, camera.position, nm)
     radiance = scene.ground.evaluate(nm) / jnp.pi * jnp.cos(sun.zenith) * beam
     due = radiance @ colour.response(nm)[:, 1]
     seen = luminance["noon"][-1]

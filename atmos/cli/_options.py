@@ -38,15 +38,17 @@ Output = Annotated[
     Path | None, option("The CSV file to write; standard output without it.")
 ]
 Precise = Annotated[bool, option("Calculate in double precision.")]
-SOLVERS = Literal["shells", "columns", "shared", "single", "march"]
-HOW = (
-    "How: shells for all orders of scattering in the round, for any sun; columns for "
-    "all orders, each column of air taken as flat (suns well above the horizon); "
-    "shared for all orders, those after the first roughly (quick, not for thick air); "
-    "single for light that turned once; march for that in clouds, smoke and fire, by "
-    "steps along every ray."
-)
-Solver = Annotated[SOLVERS, option(HOW)]
+Solver = Annotated[
+    Literal["shells", "columns", "shared", "single", "march"] | None,
+    option(
+        "How: shells for all orders of scattering in the round, for any sun; columns "
+        "for all orders, each column of air taken as flat (suns well above the "
+        "horizon); shared for all orders, those after the first roughly (quick, not "
+        "for thick air); single for light that turned once; march for that in clouds, "
+        "smoke and fire, by steps along every ray.  [default: shared; with --stokes 3 "
+        "single]"
+    ),
+]
 Bake = Annotated[
     Path | None,
     option(
@@ -230,6 +232,11 @@ def check_output(option: str, path: Path, suffix: str = "") -> None:
         refuse(option, "must be a file that one may replace", path)
     if not os.access(folder, os.W_OK):
         refuse(option, "must lie in a folder that one may write to", path)
+
+
+def default_solver(stokes: int) -> str:
+    """The best that is quick from its first picture on."""
+    return "shared" if stokes == 1 else "single"
 
 
 def check_bake(path: Path | None, solver: str) -> None:

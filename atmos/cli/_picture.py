@@ -15,10 +15,10 @@ from ._model import Model
 from ._options import (
     Bake,
     check_bake,
+    default_solver,
     Files,
-    HOW,
     observed,
-    SOLVERS,
+    Solver,
     Stokes,
     SunPosition,
     World,
@@ -34,7 +34,7 @@ def sky(
     scene: Annotated[Path | None, option("A scene file instead of a world.")] = None,
     /,
     *,
-    solver: Annotated[SOLVERS | None, option(f"{HOW}  [default: single]")] = None,
+    solver: Solver = None,
     stokes: Stokes = 1,
     bake: Bake = None,
     world: Annotated[World | None, flat(WORLD)] = None,
@@ -77,7 +77,7 @@ def sky(
                 refuse(name, "must not stand beside --model", kind)
         if stokes != 1:
             refuse("--stokes", "must be 1 with --model", stokes)
-    solver = solver or "single"
+    solver = solver or default_solver(stokes)
     check_bake(bake, solver)
     start()
 

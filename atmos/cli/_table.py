@@ -27,6 +27,7 @@ from ._options import (
     Bake,
     check_bake,
     check_output,
+    default_solver,
     File,
     Output,
     Precise,
@@ -44,7 +45,7 @@ def radiance(
     scene: File,
     /,
     *,
-    solver: Solver = "single",
+    solver: Solver = None,
     stokes: Stokes = 1,
     sun_zenith: Annotated[
         tuple[float, ...] | None,
@@ -75,6 +76,7 @@ def radiance(
     """
     if output is not None:
         check_output("--output", output)
+    solver = solver or default_solver(stokes)
     check_bake(bake, solver)
     start(float64)
 

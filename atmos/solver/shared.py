@@ -20,7 +20,7 @@ from .single_scattering import SingleScattering
 _THICKEST = 1.0
 _RULE = (
     "must not scatter more than an optical depth of 1 from the ground to the top, "
-    "forward peaks apart, for shared orders"
+    "forward peaks apart, for shared orders (shells and columns take more)"
 )
 
 
