@@ -5,9 +5,13 @@ where the solver has any. All is decided by how many looks there were before, so
 picture that was interrupted goes on to the same bits.
 """
 
+import collections
 import dataclasses
+import itertools
 import math
-from collections.abc import Iterator
+import os
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 
 import equinox as eqx
 import jax
@@ -105,7 +109,7 @@ def expose(
 ) -> Iterator[Film]:
     """Looks at the sky through the film's camera, again and again without end.
 
-    Gives the film after each stretch of pixels.
+    Gives the film after each stretch of pixels; all cores of a CPU work on the next.
     """
     if response is not None:
         response = response.astype(sky.wavelength.dtype)
@@ -113,26 +117,46 @@ def expose(
     size = tallies[0].mean.shape[0]
     pixels = np.flatnonzero(_sees(film.camera)).astype(np.int32)
     pixels = np.pad(pixels, (0, len(tallies) * size - pixels.size), mode="edge")
-    done = round(film.looks * len(tallies))
-    while True:
-        index, which = divmod(done, len(tallies))
+
+    def seen(number):
+        index, which = divmod(number, len(tallies))
         part = jnp.asarray(pixels[which * size : (which + 1) * size])
-        tallies[which] = jax.block_until_ready(
-            _add(tallies[which], sky, film.camera, part, jnp.int32(index), response)
-        )
-        done += 1
+        look = sky, film.camera, part, jnp.int32(index), response
+        return jax.block_until_ready(_look(*look))
+
+    for number, found in _in_turn(seen, round(film.looks * len(tallies))):
+        which = number % len(tallies)
+        tallies[which] = jax.block_until_ready(_join(tallies[which], found))
         yield dataclasses.replace(film, tallies=tuple(tallies))
 
 
+def _in_turn(work: Callable[[int], Array], first: int) -> Iterator[tuple[int, Array]]:
+    """What is worked out for one number after the other, without end."""
+    # The first compiles what the others use.
+    yield first, work(first)
+    workers = (os.cpu_count() or 1) if jax.default_backend() == "cpu" else 1
+    pool, ahead = ThreadPoolExecutor(workers), collections.deque()
+    try:
+        for number in itertools.count(first + 1):
+            ahead.append((number, pool.submit(work, number)))
+            if len(ahead) > workers:
+                done, found = ahead.popleft()
+                yield done, found.result()
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)
+
+
+_join = eqx.filter_jit(lambda tally, seen: tally.join(Tally.of(seen[None])))
+
+
 @eqx.filter_jit
-def _add(
-    tally: Tally,
+def _look(
     sky: SolvedSky,
     camera: AbstractCamera,
     pixels: Int[Array, "pixel"],
     index: Integer[Scalar, ""],
     response: Response | None,
-) -> Tally:
+) -> Float[Array, "pixel channel"]:
     dtype = sky.wavelength.dtype
     key = jax.random.fold_in(jax.random.key(0), index)
 
@@ -151,7 +175,7 @@ def _add(
         seen = jax.vmap(anew.radiance)(positions, directions)
     if response is not None:
         seen = jnp.matmul(seen, response, precision="highest")
-    return tally.join(Tally.of(seen[None]))
+    return seen
 
 
 def _shuffled(solver: AbstractSolver, *numbers: Integer[Scalar, ""]) -> AbstractSolver:

@@ -46,4 +46,9 @@ def versine(a: Direction, b: Direction) -> Versine:
     single-precision number is 1 all over the solar disk.
     """
     apart = a - b
-    return 0.5 * jnp.dot(apart, apart)
+    return 0.5 * inner(apart, apart)
+
+
+def inner(a: Float[Array, "3"], b: Float[Array, "3"]) -> Number:
+    """The scalar product, term by term: so it takes least time in large batches."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

@@ -2,7 +2,7 @@
 
 import jax.numpy as jnp
 
-from .quantity import Angle, Direction, Versine
+from .quantity import Angle, Direction, inner, Versine
 
 
 def basis(axis: Direction) -> tuple[Direction, Direction]:
@@ -23,4 +23,4 @@ def around(axis: Direction, apart: Versine, angle: Angle) -> Direction:
     sine = jnp.where(aside, jnp.sqrt(jnp.where(aside, squared, 1.0)), 0.0)
     across = jnp.cos(angle) * one + jnp.sin(angle) * other
     found = axis - apart * axis + sine * across
-    return found / jnp.sqrt(jnp.dot(found, found))
+    return found / jnp.sqrt(inner(found, found))

@@ -25,6 +25,7 @@ from atmos.medium import (
 from atmos.phase import HenyeyGreenstein
 from atmos.scene import Scene
 from atmos.solver import estimate, PathTracing, RayMarching, solve, VolumeTracing
+from atmos.solver._chance import quick
 from atmos.solver._majorants import Cells, cross, fly
 from atmos.spectrum import Constant, PowerLaw
 
@@ -170,9 +171,10 @@ def test_a_ray_meets_as_much_as_lies_in_its_cells():
     @jax.jit
     @jax.vmap
     def through(start, aim, depth):
-        return fly(
-            cells, cross(cells, start, aim, *map(jnp.asarray, (0.0, 100.0))), depth
-        )
+        ray = cross(cells, start, aim, *map(jnp.asarray, (0.0, 100.0)))
+        begun = ray, depth, depth, jnp.array(False)
+        goes_on = lambda x: x[0].inside(cells) & ~x[3]
+        return jax.lax.while_loop(goes_on, lambda x: fly(cells, *x[:2]), begun)
 
     # A fine march through the same cells by midpoints.
     s = (np.arange(20_000) + 0.5) * 6e-4
@@ -181,11 +183,25 @@ def test_a_ray_meets_as_much_as_lies_in_its_cells():
     index = np.clip(np.floor((places - LOWER) / (UPPER - LOWER) * 6), 0, 5).astype(int)
     depth = np.cumsum(bounds[tuple(np.moveaxis(index, -1, 0))] * inside, 1) * 6e-4
     looks = jnp.asarray(start), jnp.asarray(aim)
-    assert not np.any(through(*looks, jnp.asarray(1.01 * depth[:, -1] + 1e-3))[2])
-    ray, bound, met = through(*looks, jnp.asarray(0.5 * depth[:, -1]))
+    assert not np.any(through(*looks, jnp.asarray(1.01 * depth[:, -1] + 1e-3))[3])
+    ray, _, bound, met = through(*looks, jnp.asarray(0.5 * depth[:, -1]))
     assert np.all(met) and np.all(bound > 0.0)
     reached = [d[np.searchsorted(s, x)] for d, x in zip(depth, ray.at, strict=True)]
     np.testing.assert_allclose(reached, 0.5 * depth[:, -1], atol=2e-3)
+
+
+def test_quick_random_numbers_are_even_and_know_nothing_of_each_other():
+    key, count = quick(jax.random.key(0)), 2**14
+    draw = lambda i: jax.random.uniform(jax.random.fold_in(key, i), (6,), jnp.float32)
+    u = np.asarray(jax.jit(jax.vmap(draw))(jnp.arange(count)), float)
+    assert np.all((u >= 0.0) & (u < 1.0)) and len(np.unique(u[:, 0])) > 0.99 * count
+    # Those of a key, and those of a key and of the next; in standard errors.
+    pairs = np.corrcoef(np.concatenate([u[:-1], u[1:]], 1).T) - np.eye(12)
+    assert np.max(np.abs(pairs)) < 4.5 / np.sqrt(count)
+    for one, other in ((0, 1), (3, 4)):
+        cells = np.histogram2d(u[:, one], u[:, other], 16, [[0, 1], [0, 1]])[0]
+        squares = np.sum((cells - count / 256) ** 2) / (count / 256)
+        assert abs(squares - 255.0) < 4.5 * np.sqrt(2.0 * 255.0)
 
 
 GRID = Grid(np.ones((9, 9, 9)), LOWER, UPPER)

@@ -5,16 +5,21 @@ transmitted over depth, albedo, asymmetry and sun (DISORT with 128 streams); a s
 box much wider than high here. A z-score is an error in standard errors.
 
 Mitsuba's `volpath` renders the same cloud of 64 cubed cells, lit by one sun, with an
-albedo of 0.999 and an asymmetry of 0.85; pixels are compared one by one.
+albedo of 0.999 and an asymmetry of 0.85; pixels are compared one by one. Then it and
+`volpathmis` take turns with atmos at pictures of 64 x 64 pixels: efficiency is one over
+the time and the variance, the sum of that of all pixels over the sum of their squares.
 
     python -m validation.volumes --truth DIR
 """
 
 import argparse
 import csv
+import os
 import sys
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -25,20 +30,24 @@ from atmos.light import Sun
 from atmos.medium import Box, Grid, Medium, Puff
 from atmos.phase import HenyeyGreenstein
 from atmos.scene import Scene
-from atmos.solver import solve, VolumeTracing
+from atmos.solver import solve, SolvedSky, VolumeTracing
 
 from .claim import Claim, main
 
 
 WIDE = 1e5  # how much wider than high a slab is
-LOOKS = 1024  # directions for each flux
+LOOKS = 4096  # directions for each flux
 SIZE, LOOKS_A_PIXEL = 16, 256
+# Pixels along an edge where time is taken; turns, and pictures at each.
+FINE, TURNS, PICTURES = 64, 7, 12
 
 
 def claims(arguments: argparse.Namespace) -> Iterator[Claim]:
     if arguments.truth is not None:
         yield from of_slabs(arguments.truth / "slab_reflectance_transmittance_hg.csv")
-    yield from of_mitsuba()
+    grid = cloud()
+    yield from of_mitsuba(grid)
+    yield from of_efficiency(grid)
 
 
 def flux(row: dict[str, float], below: bool, seed: int) -> tuple[float, float]:
@@ -110,57 +119,101 @@ SUN, EYE, VIEW = np.array([0.6, 0.0, 0.8]), np.array([0.0, -5.0, 2.0]), 0.5
 DENSE, ALBEDO, ASYMMETRY = 12.0, 0.999, 0.85
 
 
-def of_mitsuba() -> Iterator[Claim]:
-    grid = cloud()
+def of_mitsuba(grid: Grid) -> Iterator[Claim]:
     start = time.perf_counter()
-    theirs = mitsubas(grid)
+    other = mitsubas(grid)
     print(f"Mitsuba: {time.perf_counter() - start:.1f} s", file=sys.stderr)
     start = time.perf_counter()
-    ours = traced(grid)
+    many = seen(traced(grid), SIZE, LOOKS_A_PIXEL, 1)
+    ours = many.mean(-1), many.std(-1, ddof=1) / np.sqrt(LOOKS_A_PIXEL)
     print(f"atmos: {time.perf_counter() - start:.1f} s", file=sys.stderr)
-    spread = np.sqrt(ours[1] ** 2 + theirs[1] ** 2)
-    seen = spread > 0.0
-    scores = (ours[0] - theirs[0])[seen] / spread[seen]
-    source = f"Mitsuba, {np.sum(seen)} pixels"
+    spread = np.sqrt(ours[1] ** 2 + other[1] ** 2)
+    lit = spread > 0.0
+    scores = (ours[0] - other[0])[lit] / spread[lit]
+    source = f"Mitsuba, {np.sum(lit)} pixels"
     yield Claim(
         "cloud: largest error in standard errors", source, 4.5, max(abs(scores))
     )
     yield Claim(
         "cloud: spread of z, 1 if errors are right", source, 1.3, np.std(scores)
     )
-    total = [np.sum(x[0]) for x in (ours, theirs)]
-    error = [np.sqrt(np.sum(x[1] ** 2)) for x in (ours, theirs)]
+    total = [np.sum(x[0]) for x in (ours, other)]
+    error = [np.sqrt(np.sum(x[1] ** 2)) for x in (ours, other)]
     score = abs(total[0] - total[1]) / np.hypot(*error)
     yield Claim("cloud: whole picture, in standard errors", source, 3.0, score)
     error = np.hypot(*error) / total[1]
     yield Claim("cloud: standard error of the whole, relative", source, None, error)
 
 
-def traced(grid: Grid) -> tuple[np.ndarray, np.ndarray]:
-    """Means of the pixels, and their standard errors."""
+def traced(grid: Grid) -> SolvedSky:
     parts = DENSE * ALBEDO, DENSE * (1.0 - ALBEDO)
     medium = Medium(grid, *parts, HenyeyGreenstein(ASYMMETRY))
     scene = Scene(Flat(), 10.0, (medium,), (Sun(SUN, 1.0, 0.0),))
-    solver = VolumeTracing(walks=2, paths=8)
-    sky = solve(scene, solver, jnp.array([550.0]))
-    rng = np.random.default_rng(1)
-    y, x = np.indices((SIZE, SIZE))[..., None] + rng.uniform(
-        size=(2, SIZE, SIZE, LOOKS_A_PIXEL)
-    )
+    return solve(scene, VolumeTracing(walks=2, paths=8), jnp.array([550.0]))
+
+
+def seen(sky: SolvedSky, size: int, each: int, seed: int) -> np.ndarray:
+    """A picture, so many looks through each pixel on the last axis."""
+    rng = np.random.default_rng(seed)
+    y, x = np.indices((size, size))[..., None] + rng.uniform(size=(2, size, size, each))
     slope = np.tan(0.5 * VIEW)
-    right, down = ((2.0 * a / SIZE - 1.0) * slope for a in (x, y))
+    right, down = ((2.0 * a / size - 1.0) * slope for a in (x, y))
     looks = np.stack([right, np.ones_like(x), -down], -1)
     looks = looks / np.linalg.norm(looks, axis=-1, keepdims=True)
     looks = jnp.asarray(looks.reshape(-1, 3), jnp.float32)
     start = jnp.broadcast_to(jnp.asarray(EYE, jnp.float32), looks.shape)
     light = sky.scene.lights[0]
     more = sky.prepared, sky.scene, light, sky.wavelength, start, looks
-    found = np.asarray(sky.solver.tally(*more).mean).reshape(SIZE, SIZE, -1)
-    return found.mean(-1), found.std(-1, ddof=1) / np.sqrt(LOOKS_A_PIXEL)
+    return np.asarray(sky.solver.tally(*more).mean, float).reshape(size, size, -1)
+
+
+def of_efficiency(grid: Grid) -> Iterator[Claim]:
+    """Ours and theirs in turns, as what else the computer does slows down both."""
+    sky = traced(grid)
+    solver = sky.solver
+    assert isinstance(solver, VolumeTracing)
+    each = solver.walks * solver.paths
+    ours = lambda seed: seen(sky, FINE, 1, seed)[..., 0]
+    ours(0)
+    import mitsuba as mi
+
+    kinds = {x: theirs(grid, FINE, each, x) for x in ("volpath", "volpathmis")}
+    pictures, seconds = {x: [] for x in ("atmos", *kinds)}, {}
+    for turn in range(TURNS):
+        seeds = range(1 + turn * PICTURES, 1 + (turn + 1) * PICTURES)
+        for name, found in pictures.items():
+            start = time.perf_counter()
+            if name == "atmos":
+                with ThreadPoolExecutor(os.cpu_count()) as pool:
+                    found += pool.map(ours, seeds)
+            else:
+                render = lambda x, kind=kinds[name]: np.array(mi.render(kind, seed=x))
+                found += [render(x)[..., 0].astype(float) for x in seeds]
+            taken = (time.perf_counter() - start) / (PICTURES * each)
+            seconds.setdefault(name, []).append(taken)
+    due = np.sum(np.mean([np.mean(x, 0) for x in pictures.values()], 0) ** 2)
+    spread = {x: each * np.sum(np.var(y, 0, ddof=1)) / due for x, y in pictures.items()}
+    for name, taken in seconds.items():
+        quick = np.median(taken)
+        print(f"{name}: {FINE * FINE / quick:.0f} paths/s", file=sys.stderr)
+        yield Claim(f"cloud: {name}, variance of a path", "", None, spread[name])
+        if name != "atmos":
+            ratio = np.median(np.divide(seconds["atmos"], taken))
+            worse = ratio * spread["atmos"] / spread[name]
+            yield Claim(f"cloud: efficiency of {name} over ours", name, 1.0, worse)
 
 
 def mitsubas(grid: Grid, count: int = 32) -> tuple[np.ndarray, np.ndarray]:
-    """The same by so many pictures of Mitsuba's."""
+    """Means of the pixels and their standard errors by so many of Mitsuba's."""
+    import mitsuba as mi
+
+    scene = theirs(grid, SIZE, 32, "volpath")
+    many = [np.array(mi.render(scene, seed=i))[..., 0] for i in range(count)]
+    return np.mean(many, 0), np.std(many, 0, ddof=1) / np.sqrt(count)
+
+
+def theirs(grid: Grid, size: int, each: int, integrator: str) -> Any:
+    """Mitsuba's cloud, seen by so many paths a pixel."""
     import mitsuba as mi
 
     mi.set_variant("scalar_rgb")
@@ -180,10 +233,10 @@ def mitsubas(grid: Grid, count: int = 32) -> tuple[np.ndarray, np.ndarray]:
         "scale": DENSE,
         "phase": {"type": "hg", "g": ASYMMETRY},
     }
-    scene = mi.load_dict(
+    return mi.load_dict(
         {
             "type": "scene",
-            "integrator": {"type": "volpath", "max_depth": 100_000, "rr_depth": 1000},
+            "integrator": {"type": integrator, "max_depth": 100_000, "rr_depth": 1000},
             "cloud": {
                 "type": "cube",
                 "to_world": box,
@@ -201,16 +254,14 @@ def mitsubas(grid: Grid, count: int = 32) -> tuple[np.ndarray, np.ndarray]:
                 "to_world": toward,
                 "film": {
                     "type": "hdrfilm",
-                    "width": SIZE,
-                    "height": SIZE,
+                    "width": size,
+                    "height": size,
                     "rfilter": {"type": "box"},
                 },
-                "sampler": {"type": "independent", "sample_count": 32},
+                "sampler": {"type": "independent", "sample_count": each},
             },
         }
     )
-    many = [np.array(mi.render(scene, seed=i))[..., 0] for i in range(count)]
-    return np.mean(many, 0), np.std(many, 0, ddof=1) / np.sqrt(count)
 
 
 if __name__ == "__main__":

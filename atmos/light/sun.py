@@ -139,9 +139,10 @@ class Sun(AbstractLight):
         inside = squared > 0.0
         cosine = jnp.where(inside, jnp.sqrt(jnp.where(inside, squared, 1.0)), 0.0)
         coefficients = limb_darkening(wavelength)
-        powers = jnp.stack([cosine**k for k in range(6)])[:, None]
-        shape = jnp.sum(coefficients * powers, 0) / _mean(coefficients)
-        return self.irradiance.evaluate(wavelength) * shape
+        shape = jnp.zeros_like(wavelength)
+        for each in coefficients[::-1]:
+            shape = shape * cosine + each
+        return self.irradiance.evaluate(wavelength) * shape / _mean(coefficients)
 
     def slice(self, height: Number, wavelength: Wavelength) -> Float[Array, "wl"]:
         """The share of the irradiance that comes from a strip across the disk.

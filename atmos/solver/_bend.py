@@ -9,7 +9,7 @@ from jax.lax import stop_gradient
 from jaxtyping import Array, Bool, Float, PRNGKeyArray
 
 from ..geometry import Point
-from ..quantity import Direction, versine
+from ..quantity import Direction, inner, versine
 from ..rotation import around
 from ._collision import phase, turn
 from ._meeting import Meeting
@@ -55,7 +55,7 @@ def turned(
     real = stop_gradient(place.real)
     real = jnp.where(first, jnp.maximum(real, trip.least), real)
     turns = path & met & (u[0] < real[hero])
-    solid = path & ~met & place.leg.blocked
+    solid = path & place.ends & place.leg.blocked
     inward = place.leg.path.direction
     apart = turn(quest.scene, nm, place.mixture, hero, u[1], key)
     onward = stop_gradient(around(inward, apart, 2.0 * math.pi * u[3]))
@@ -75,8 +75,9 @@ def turned(
     )
     shares = jnp.where(bend.smooth, 1.0, falls(quest, bend, bend.onward))
     seen = jnp.where(turns, place.scattering, 1.0 - place.real)
+    going = jnp.where(place.ends, 0.0, 1.0)
     passed = Passed(
-        seen=jnp.where(met, seen, jnp.where(solid, wall.share, 0.0)),
+        seen=jnp.where(met, seen, jnp.where(solid, wall.share, going)),
         chance=jnp.where(met, jnp.where(turns, real, 1.0 - real), 1.0),
     )
     return eqx.tree_at(lambda x: x.shares, bend, shares), passed
@@ -105,7 +106,7 @@ def _wall(quest: Quest, place: Meeting, u: Float[Array, "3"]) -> Wall:
     inward = place.leg.path.direction
     for i, x in enumerate(scene.surfaces):
         normal = x.shape.normal(point.position)
-        behind = jnp.dot(inward, normal) > 0.0
+        behind = inner(inward, normal) > 0.0
         wall = Wall(
             point=point,
             normal=jnp.where(behind, -normal, normal),
@@ -122,5 +123,5 @@ def falls(quest: Quest, bend: Bend, direction: Direction) -> Float[Array, "wl"]:
     """How much of the light that turns here comes from a direction, per sr."""
     apart = versine(bend.inward, direction)
     found = phase(quest.scene, quest.wavelength, bend.mixture, apart)
-    level = jnp.maximum(jnp.dot(bend.normal, direction), 0.0) / math.pi
+    level = jnp.maximum(inner(bend.normal, direction), 0.0) / math.pi
     return jnp.where(bend.solid, level, found)

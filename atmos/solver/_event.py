@@ -6,6 +6,7 @@ found for it. That is unbiased (detached sampling: Zeltner, Speierer, Georgiev a
 """
 
 import dataclasses
+import math
 
 import equinox as eqx
 import jax
@@ -18,32 +19,44 @@ from ..light import Shine
 from ..quantity import Number
 from ..transport import columns
 from ._bend import Bend, falls, turned
+from ._chance import as_key
 from ._flight import dot, LIGHT_NODES
 from ._meeting import meet, Meeting
+from ._settled import settled
 from ._trip import Leg, Quest, set_out, Trip
 from ._walk import weigh
 
 
 # Below this share of what it had, a path or a beam is given up by chance.
 _FAINT = 0.1
+# A beam to what lies beyond the world is always sent where a path turns first, and
+# where so many times as much turns its way as if all ways were alike. Else it is sent
+# in proportion, but never more seldom than this.
+_OFTEN, _SELDOM = 4.0, 0.05
 # The density, per sr, with which a smooth surface sends light on.
 _SHARP = 1e15
 
 
 def proceed(quest: Quest, trip: Trip) -> Trip:
     """On to the next collision, real or null, to the ground or out."""
-    key, own = jax.random.split(jax.random.fold_in(trip.key, trip.step + 1))
-    u = jax.random.uniform(key, (9,), quest.wavelength.dtype)
-    place = meet(quest, trip, u[:2])
-    path = ~trip.beaming & (trip.left > 0)
+    key, own = jax.random.split(jax.random.fold_in(as_key(trip.key), trip.step + 1))
+    u = settled(
+        jax.random.uniform(key, (10,), quest.wavelength.dtype), quest.wavelength
+    )
+    place = settled(meet(quest, trip, u[:2]), quest.wavelength)
+    path = ~trip.beaming & ~trip.ended
     seen = _seen(quest, trip, place)
     found = trip.total + jnp.where(path, trip.weight * seen, 0.0)
-    arrives = trip.beaming & ~place.met & ~place.leg.blocked
+    arrives = trip.beaming & place.ends & ~place.leg.blocked
     found += jnp.where(arrives, trip.beam, 0.0)
 
-    bend, passed = turned(quest, trip, place, path, u[2:6], own)
+    bend, passed = settled(
+        turned(quest, trip, place, path, u[2:6], own), quest.wavelength
+    )
     weight, ratio = weigh(trip.weight, trip.ratio, passed.seen, passed.chance)
-    shine, beam = _light_up(quest, trip, bend, weight, ratio, u[7:])
+    shine, beam = settled(
+        _light_up(quest, trip, bend, weight, ratio, u[7:]), quest.wavelength
+    )
     beam = jnp.where(bend.turns, beam, _dim(trip, place, u[2]))
     aim = jnp.where(bend.smooth, _SHARP, jnp.mean(ratio * stop_gradient(bend.shares)))
     aim = jnp.where(bend.turns, aim, trip.aim)
@@ -63,35 +76,31 @@ def proceed(quest: Quest, trip: Trip) -> Trip:
 
     # A beam sets out where the path turns; the path sets out where the beam ends.
     sets_out = bend.turns & jnp.any(beam > 0.0)
-    back = trip.beaming & (~place.met | ~jnp.any(beam > 0.0))
+    back = trip.beaming & (place.ends | ~jnp.any(beam > 0.0))
     beaming = sets_out | (trip.beaming & ~back)
     onward = jnp.where(bend.turns, bend.onward, trip.onward)
-    ended = ~beaming & ~jnp.any(weight > 0.0)
     choose = lambda which, x, y: jax.tree.map(lambda a, b: jnp.where(which, a, b), x, y)
     start = choose(bend.turns, bend.point, place.leg.path.start)
-    start = choose(ended, trip.eye, start)
     towards = jnp.where(sets_out, shine.direction, onward)
-    towards = jnp.where(ended, trip.outward, towards)
     most = jnp.where(sets_out, shine.distance, FAR)
     leaves = jnp.where(bend.turns & ~place.met, place.leg.surface, -1)
     leaves = jnp.where(bend.turns, leaves, place.leg.leaves)
-    leaves = jnp.where(ended, -1, leaves)
+    start, towards, most, leaves = settled(
+        (start, towards, most, leaves), quest.wavelength
+    )
     leg = set_out(quest, start, towards, most, leaves)
     beam = jnp.where(sets_out, beam * _clear(quest, leg), beam)
-    leg = choose(bend.turns | back | ended, leg, place.leg)
-    count = max(quest.wavelength.shape[0], 1)
+    leg = choose(bend.turns | back, leg, place.leg)
     return dataclasses.replace(
         trip,
         step=trip.step + 1,
-        left=trip.left - (ended & (trip.left > 0)).astype(jnp.int32),
         leg=leg,
         beaming=beaming,
         onward=onward,
         aim=aim,
-        order=jnp.where(ended, 0, order),
-        hero=jnp.where(ended, (trip.hero + 1) % count, trip.hero),
-        weight=jnp.where(ended, 1.0, weight),
-        ratio=jnp.where(ended, 1.0, ratio),
+        order=order,
+        weight=weight,
+        ratio=ratio,
         beam=beam,
         bright=jnp.where(sets_out, jnp.max(beam, initial=0.0), trip.bright),
         total=found,
@@ -100,7 +109,7 @@ def proceed(quest: Quest, trip: Trip) -> Trip:
 
 def _seen(quest: Quest, trip: Trip, place: Meeting) -> Float[Array, "wl"]:
     """What shines where a path has come to."""
-    leaves = ~place.met & ~place.leg.blocked
+    leaves = place.ends & ~place.leg.blocked
     seen = jnp.where(place.met, place.shining, 0.0)
     if quest.light is None:
         return seen
@@ -120,7 +129,7 @@ def _light_up(
     bend: Bend,
     weight: Float[Array, "wl"],
     ratio: Float[Array, "wl"],
-    u: Float[Array, "2"],
+    u: Float[Array, "3"],
 ) -> tuple[Shine, Float[Array, "wl"]]:
     """Where to look for the light from where a path turns, and what it may add."""
     nm = quest.wavelength
@@ -128,10 +137,16 @@ def _light_up(
         far = jnp.full_like(trip.bright, FAR)
         dark = jnp.zeros_like(nm)
         return Shine(bend.onward, far, dark, jnp.zeros_like(far)), dark
-    shine = quest.light.sample(bend.point.position, u, nm)
+    shine = quest.light.sample(bend.point.position, u[:2], nm)
     share = falls(quest, bend, shine.direction)
     apt = jnp.mean(ratio * stop_gradient(share)) * shine.solid_angle
     beam = weight * share * shine.irradiance / (1.0 + apt)
+    # Where little light turns this way beams are seldom sent, and weigh more.
+    even = jnp.max(share) * (4.0 * math.pi / _OFTEN)
+    sent = jnp.clip(stop_gradient(even), _SELDOM, 1.0)
+    always = (shine.distance < FAR) | (trip.order == 0)
+    sent = jnp.where(always, 1.0, sent)
+    beam = jnp.where(u[2] < sent, beam / sent, 0.0)
     # What a smooth surface shows is never found on purpose.
     return shine, jnp.where(bend.smooth, 0.0, beam)
 

@@ -10,25 +10,43 @@ from ..scene import Scene
 from ..transport import extinctions
 
 
+# How many cells a ray goes through, at most, before all others are waited for.
+_STRIDE = 4
+
+
 class Cells(eqx.Module):
     """Cells in a box that holds some media: bounds of the extinction, in m^-1.
 
-    At all wavelengths alike, as a path serves them all.
+    At all wavelengths alike, as a path serves them all. Where there is nothing: minus
+    how many cells all around hold nothing either.
     """
 
     lower: Position
     upper: Position
     bounds: Float[Array, "nx ny nz"]
 
+    @property
+    def size(self) -> Integer[Array, "3"]:
+        """How many there are along each axis."""
+        return jnp.array(self.bounds.shape, jnp.int32)
 
-def cells_of(scene: Scene, wavelength: Wavelength, cells: int) -> Cells:
-    """Bounds on so many cells along each axis of the box of media that have one."""
+    @property
+    def step(self) -> Position:
+        """How large each is, in m."""
+        return (self.upper - self.lower) / self.size.astype(self.lower.dtype)
+
+
+def cells_of(scene: Scene, wavelength: Wavelength, cells: int, slack: Number) -> Cells:
+    """Bounds on so many cells along each axis of the box of media that have one.
+
+    They are `slack` times as high as must be.
+    """
     boxes = [x.profile.box for x in scene.media]
     lower = jnp.min(jnp.stack([x[0] for x in boxes if x is not None]), 0)
     upper = jnp.max(jnp.stack([x[1] for x in boxes if x is not None]), 0)
     # What shines must be met, even if it takes no light away.
     size = jnp.sqrt(jnp.sum((upper - lower) ** 2))
-    most = at_most(scene, wavelength, 4.0 / size)
+    most = slack * at_most(scene, wavelength, 4.0 / size)
     index = jnp.stack(jnp.meshgrid(*[jnp.arange(cells)] * 3, indexing="ij"), -1)
     index = index.reshape(-1, 3)
     step = (upper - lower) / cells
@@ -40,7 +58,18 @@ def cells_of(scene: Scene, wavelength: Wavelength, cells: int) -> Cells:
         return jnp.sum(jnp.stack(found) * most)
 
     bounds = jax.lax.map(bound, index, batch_size=1024)
-    return Cells(lower, upper, bounds.reshape(cells, cells, cells))
+    return Cells(lower, upper, _cleared(bounds.reshape(cells, cells, cells)))
+
+
+def _cleared(bounds: Float[Array, "nx ny nz"]) -> Float[Array, "nx ny nz"]:
+    """With the numbers of cells that hold nothing where there is nothing."""
+    full, clear = bounds > 0.0, jnp.zeros_like(bounds)
+    for _ in range(max(bounds.shape)):
+        full = jax.lax.reduce_window(
+            full, False, jax.lax.bitwise_or, (3, 3, 3), (1, 1, 1), "SAME"
+        )
+        clear += jnp.where(full, 0.0, 1.0)
+    return jnp.where(bounds > 0.0, bounds, -clear)
 
 
 def at_most(
@@ -63,8 +92,7 @@ class Crossing(eqx.Module):
 
     def inside(self, cells: Cells) -> Bool[Array, ""]:
         """Whether there is more to come."""
-        size = jnp.array(cells.bounds.shape, jnp.int32)
-        within = jnp.all((self.cell >= 0) & (self.cell < size))
+        within = jnp.all((self.cell >= 0) & (self.cell < cells.size))
         return within & (self.at < self.far)
 
 
@@ -76,58 +104,55 @@ def cross(
     ends = jnp.stack([cells.lower - start, cells.upper - start]) / slope[None]
     enter = jnp.maximum(jnp.max(jnp.min(ends, 0)), near)
     leave = jnp.minimum(jnp.min(jnp.max(ends, 0)), far)
-    size = jnp.array(cells.bounds.shape, jnp.int32)
-    share = (start + enter * direction - cells.lower) / (cells.upper - cells.lower)
-    cell = jnp.int32(jnp.floor(share * size.astype(share.dtype)))
     at = jnp.where(leave > enter, enter, far)
-    return Crossing(
-        start, direction, at, jnp.minimum(leave, far), jnp.clip(cell, 0, size - 1)
-    )
+    cell = jnp.clip(_cell(cells, start + enter * direction), 0, cells.size - 1)
+    return Crossing(start, direction, at, jnp.minimum(leave, far), cell)
 
 
 def fly(
     cells: Cells, ray: Crossing, depth: Number
-) -> tuple[Crossing, Number, Bool[Array, ""]]:
-    """On to where the bounds have added up to an optical depth, or out.
+) -> tuple[Crossing, Number, Number, Bool[Array, ""]]:
+    """On to where the bounds have added up to an optical depth, or some cells on.
 
-    With the bound there, and whether it was reached. The cells that lie on the way are
-    gone through one after the other (Amanatides and Woo 1987).
+    With the depth that is left, the bound there, and whether it was reached. The cells
+    that lie on the way are gone through one after the other (Amanatides and Woo 1987),
+    those that hold nothing many at once.
     """
     slope = _slope(ray.direction)
-    size = jnp.array(cells.bounds.shape, jnp.int32)
-    step = (cells.upper - cells.lower) / size.astype(slope.dtype)
     ahead = (slope > 0.0).astype(jnp.int32)
-    sign = 2 * ahead - 1
-
-    def goes_on(state):
-        ray, _, _, done = state
-        return ~done & ray.inside(cells)
-
-    def through(state):
-        ray, depth, _, _ = state
-        edges = cells.lower + (ray.cell + ahead).astype(step.dtype) * step
-        ends = (edges - ray.start) / slope
-        axis = jnp.argmin(ends)
-        end = jnp.clip(ends[axis], ray.at, ray.far)
-        i, j, k = jnp.clip(ray.cell, 0, size - 1)
+    step, last = cells.step, cells.size - 1
+    most, met = jnp.ones_like(depth), jnp.array(False)
+    for _ in range(_STRIDE):
+        goes = ~met & ray.inside(cells)
+        i, j, k = jnp.clip(ray.cell, 0, last)
         bound = cells.bounds[i, j, k]
-        within = depth < bound * (end - ray.at)
+        around = jnp.int32(jnp.maximum(-bound, 0.0))
+        edge = ray.cell + jnp.where(ahead > 0, around + 1, -around)
+        ends = (cells.lower + edge.astype(step.dtype) * step - ray.start) / slope
+        end = jnp.clip(jnp.min(ends), ray.at, ray.far)
+        gains = jnp.maximum(bound, 0.0) * (end - ray.at)
+        here = goes & (depth < gains)
         # 0 * inf, of a cell that is empty, cannot arise: rays end.
         stop = ray.at + depth / jnp.where(bound > 0.0, bound, 1.0)
-        left = depth - bound * (end - ray.at)
-        cell = ray.cell + jnp.where(jnp.arange(3) == axis, sign, 0)
+        # Into the next by number, as rounding may not have left the one before.
+        there = _cell(cells, ray.start + end * ray.direction)
+        there = jnp.clip(there, ray.cell - around, ray.cell + around)
+        there = jnp.where(ends <= end, edge - 1 + ahead, there)
+        on = goes & ~here
         ray = Crossing(
             start=ray.start,
             direction=ray.direction,
-            at=jnp.where(within, stop, end),
+            at=jnp.where(here, stop, jnp.where(on, end, ray.at)),
             far=ray.far,
-            cell=jnp.where(within, ray.cell, cell),
+            cell=jnp.where(on, there, ray.cell),
         )
-        return ray, jnp.where(within, 0.0, left), bound, within
+        depth = jnp.where(here, 0.0, jnp.where(on, depth - gains, depth))
+        most, met = jnp.where(here, bound, most), met | here
+    return ray, depth, most, met
 
-    start = ray, depth, jnp.zeros_like(depth), jnp.array(False)
-    ray, _, bound, done = jax.lax.while_loop(goes_on, through, start)
-    return ray, bound, done
+
+def _cell(cells: Cells, place: Position) -> Integer[Array, "3"]:
+    return jnp.int32(jnp.floor((place - cells.lower) / cells.step))
 
 
 def _slope(direction: Direction) -> Direction:

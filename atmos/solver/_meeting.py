@@ -11,12 +11,13 @@ from ..quantity import Number
 from ..transport import densities
 from ._majorants import cross, fly
 from ._ray import total
+from ._settled import settled
 from ._strata import climb
 from ._trip import Leg, Quest, Trip
 
 
 class Meeting(eqx.Module):
-    """Where what is met lies, or the way ends if nothing `met`.
+    """Where what is met lies, or the way `ends`; or neither, on a long way.
 
     Of `bound`, the share `real` is there, and the share `scattering` turns light, by
     `mixture` in each medium. Layered air, where it is `airy`, is met apart from clouds.
@@ -25,6 +26,7 @@ class Meeting(eqx.Module):
     leg: Leg
     point: Point
     met: Bool[Array, ""]
+    ends: Bool[Array, ""]
     airy: Bool[Array, ""]
     bound: Number
     real: Float[Array, "wl"]
@@ -41,15 +43,17 @@ def meet(quest: Quest, trip: Trip, u: Float[Array, "2"]) -> Meeting:
     cells, strata = quest.majorants.cells, quest.majorants.strata
     if cells is not None:
         ray = cross(cells, path.start.position, path.direction, leg.at, leg.far)
-        ray, bound, met = fly(cells, ray, depth[0])
-        at, bound = jnp.where(met, ray.at, leg.far), jnp.where(met, bound, 1.0)
+        ray, _, bound, met = fly(cells, ray, depth[0])
+        at = jnp.where(met | ray.inside(cells), ray.at, leg.far)
     if strata is not None:
         lift = jnp.where(trip.order == 0, trip.lift, 1.0)
-        limit = jnp.where(trip.beaming, leg.at, at)
-        near, most, airy = climb(strata, path, leg.at, limit, depth[1] / lift)
-        at, bound = jnp.where(airy, near, at), jnp.where(airy, most * lift, bound)
-        met = met | airy
-    point = path.at(at)
+        near, _, most, airy = climb(strata, path, leg.at, at, depth[1] / lift)
+        nearer = ~trip.beaming & (near < at)
+        at, bound = jnp.where(nearer, near, at), jnp.where(nearer, most * lift, bound)
+        airy = airy & nearer
+        met = jnp.where(nearer, airy, met)
+    at, bound, met, airy = settled((at, bound, met, airy), quest.wavelength)
+    point = settled(path.at(at), quest.wavelength)
     own = jnp.array([x.profile.layered for x in quest.scene.media], bool) == airy
     here = jnp.where(own, densities(quest.scene, point), 0.0)
     mixture = here[:, None] * quest.scattering
@@ -58,6 +62,7 @@ def meet(quest: Quest, trip: Trip, u: Float[Array, "2"]) -> Meeting:
         leg=dataclasses.replace(leg, at=at),
         point=point,
         met=met,
+        ends=~met & (at >= leg.far),
         airy=airy,
         bound=bound,
         real=jnp.clip(total(here, quest.extinction) / bound, 0.0, 1.0),

@@ -14,6 +14,8 @@ from ._majorants import at_most
 
 # What shines must be met, even if it takes no light away: so often on the way up.
 _OFTEN = 4.0
+# How many strata a ray goes through, at most, before all others are waited for.
+_STRIDE = 3
 
 
 class Strata(eqx.Module):
@@ -34,11 +36,14 @@ class Strata(eqx.Module):
         return jnp.sum(self.bounds * (jnp.diff(up) - jnp.diff(down)))
 
 
-def strata_of(air: Scene, wavelength: Wavelength) -> Strata:
-    """Bounds for media that depend on altitude alone."""
+def strata_of(air: Scene, wavelength: Wavelength, slack: Number) -> Strata:
+    """Bounds for media that depend on altitude alone.
+
+    They are `slack` times as high as must be.
+    """
     edges = tops(air)
     edges = jnp.concatenate([jnp.zeros_like(edges[:1]), edges])
-    most = at_most(air, wavelength, _OFTEN / air.top)
+    most = slack * at_most(air, wavelength, _OFTEN / air.top)
 
     def bound(low, high):
         found = [x.profile.most_between(low, high) for x in air.media]
@@ -50,36 +55,34 @@ def strata_of(air: Scene, wavelength: Wavelength) -> Strata:
 
 def climb(
     strata: Strata, path: AbstractPath, near: Length, far: Length, depth: Number
-) -> tuple[Length, Number, Bool[Array, ""]]:
+) -> tuple[Length, Number, Number, Bool[Array, ""]]:
     """On from `near` to where the bounds have added up to an optical depth.
 
-    Or to `far`. With the bound there, and whether it was reached.
+    Or to `far`, or some strata on. With the depth that is left, the bound there, and
+    whether it was reached.
     """
     last = strata.bounds.shape[0] - 1
     lowest = path.lowest()
-
-    def goes_on(state):
-        at, stratum, _, _, done = state
-        return ~done & (at < far) & (stratum >= 0) & (stratum <= last)
-
-    def through(state):
-        at, stratum, depth, _, _ = state
-        here = jnp.clip(stratum, 0, last)
-        down, _ = path.crossings(strata.altitudes[here])
-        _, up = path.crossings(strata.altitudes[here + 1])
+    stratum = jnp.sum(strata.altitudes <= path.at(near).altitude) - 1
+    stratum = jnp.clip(stratum, 0, last).astype(jnp.int32)
+    at, most, met = near, jnp.ones_like(depth), jnp.array(False)
+    for _ in range(_STRIDE):
+        goes = ~met & (at < far)
+        down, _ = path.crossings(strata.altitudes[stratum])
+        _, up = path.crossings(strata.altitudes[stratum + 1])
         falls = at < lowest
         leaves = falls & (down < lowest)
         end = jnp.clip(jnp.where(falls, jnp.minimum(down, lowest), up), at, far)
-        bound = strata.bounds[here]
-        within = depth < bound * (end - at)
-        stop = at + depth / jnp.where(bound > 0.0, bound, 1.0)
-        left = jnp.where(within, 0.0, depth - bound * (end - at))
         step = jnp.where(leaves, -1, jnp.where(falls, 0, 1))
-        after = jnp.where(within, here, here + step)
-        return jnp.where(within, stop, end), after, left, bound, within
-
-    first = jnp.sum(strata.altitudes <= path.at(near).altitude) - 1
-    first = jnp.clip(first, 0, last).astype(jnp.int32)
-    start = near, first, depth, jnp.zeros_like(depth), jnp.array(False)
-    at, _, _, bound, done = jax.lax.while_loop(goes_on, through, start)
-    return at, bound, done
+        # Below the lowest and above the highest there is nothing to come.
+        out = (stratum + step < 0) | (stratum + step > last)
+        bound = strata.bounds[stratum]
+        gains = bound * (end - at)
+        here = goes & (depth < gains)
+        on = goes & ~here
+        stop = at + depth / jnp.where(bound > 0.0, bound, 1.0)
+        depth = jnp.where(here, 0.0, jnp.where(on, depth - gains, depth))
+        at = jnp.where(here, stop, jnp.where(on, jnp.where(out, far, end), at))
+        stratum = jnp.clip(jnp.where(on, stratum + step, stratum), 0, last)
+        most, met = jnp.where(here, bound, most), met | here
+    return at, depth, most, met

@@ -1,6 +1,6 @@
 import abc
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -12,7 +12,6 @@ from ..quantity import Direction, Number, Position, Wavelength
 from ..scene import Scene
 from ._base import AbstractSolver
 from ._sky import SolvedSky
-from ._trip import Trip
 from ._walk import Walk
 from .single_scattering import SingleScattering
 
@@ -58,10 +57,7 @@ def joined(
     return jax.lax.fori_loop(0, blocks, more, none)
 
 
-Paths = TypeVar("Paths", Trip, Walk)
-
-
-def ended(onwards: Callable[[Paths], Paths], paths: Paths) -> Paths:
+def ended(onwards: Callable[[Walk], Walk], paths: Walk) -> Walk:
     """Paths, gone on with until none of them is left."""
     return jax.lax.while_loop(lambda x: jnp.any(x.left > 0), onwards, paths)
 

@@ -9,6 +9,7 @@ from ..geometry import AbstractPath, FAR, Point
 from ..light import AbstractLight
 from ..quantity import Direction, Length, Number, Position, Wavelength
 from ..scene import Scene
+from ._chance import Words
 from ._majorants import Cells
 from ._strata import Strata
 
@@ -65,13 +66,10 @@ class Trip(eqx.Module):
     air is met `lift` times as often as it has to be, and turns no less than `least`.
     """
 
-    eye: Point
-    outward: Direction
     lift: Number
     least: Number
-    key: PRNGKeyArray
+    key: Words
     step: Integer[Array, ""]
-    left: Integer[Array, ""]
     leg: Leg
     beaming: Bool[Array, ""]
     onward: Direction
@@ -84,15 +82,20 @@ class Trip(eqx.Module):
     bright: Number
     total: Float[Array, "wl"]
 
+    @property
+    def ended(self) -> Bool[Array, ""]:
+        """Whether there is nothing more to come of it."""
+        return ~self.beaming & ~jnp.any(self.weight > 0.0)
+
 
 def begin(
     quest: Quest,
     position: Position,
     direction: Direction,
     key: PRNGKeyArray,
-    paths: Integer[Array, ""] | int,
+    hero: Integer[Array, ""],
 ) -> Trip:
-    """The first of so many paths."""
+    """A path from the eye; its places are drawn as one wavelength asks for."""
     geometry = quest.scene.geometry
     path = geometry.path(geometry.locate(position), direction).enter(quest.scene.top)
     one = jnp.ones_like(quest.wavelength)
@@ -102,21 +105,17 @@ def begin(
     depth = leg.far * 0.0 if strata is None else strata.depth(leg.path, leg.far)
     lift = jnp.maximum(_MEETS / jnp.where(depth > 0.0, depth, _MEETS), 1.0)
     behind = leg.blocked | (quest.light is not None and quest.light.backdrop)
-    count = max(quest.wavelength.shape[0], 1)
     return Trip(
-        eye=path.start,
-        outward=direction,
         lift=lift,
         least=jnp.where(behind, 0.5, 1.0) * _TURNS / (jnp.maximum(depth, _MEETS)),
-        key=key,
+        key=jax.random.key_data(key),
         step=jnp.int32(0),
-        left=jnp.int32(paths),
         leg=leg,
         beaming=jnp.array(False),
         onward=direction,
         aim=jnp.zeros_like(leg.at),
         order=jnp.int32(0),
-        hero=jax.random.randint(jax.random.fold_in(key, 0), (), 0, count),
+        hero=hero,
         weight=one,
         ratio=one,
         beam=0.0 * one,

@@ -12,11 +12,13 @@ from ..light import AbstractLight
 from ..quantity import as_float, Direction, Number, Position, Radiance, Wavelength
 from ..scene import Scene
 from ..transport import extinctions
+from ._chance import quick
 from ._event import proceed
+from ._lanes import followed
 from ._look import of_look
 from ._majorants import cells_of
 from ._strata import strata_of
-from ._tally import AbstractTracing, ended, joined, Tally
+from ._tally import AbstractTracing, joined, Tally
 from ._trip import begin, Majorants, Quest
 from .single_scattering import SingleScattering
 
@@ -89,13 +91,12 @@ class VolumeTracing(AbstractTracing):
             tuple(x for x in scene.media if x.profile.layered == layered),
         )
         air, clouds = part(True), part(False)
-        cells = cells_of(clouds, wavelength, self.cells) if clouds.media else None
-        strata = strata_of(air, wavelength) if air.media else None
-        bounds = [x for x in (cells, strata) if x is not None]
-        higher = [x.bounds * self.slack.astype(wavelength.dtype) for x in bounds]
-        found = Majorants(cells, strata)
-        where = lambda x: [y.bounds for y in (x.cells, x.strata) if y is not None]
-        return eqx.tree_at(where, found, higher)
+        slack = self.slack.astype(wavelength.dtype)
+        cells = None
+        if clouds.media:
+            cells = cells_of(clouds, wavelength, self.cells, slack)
+        strata = strata_of(air, wavelength, slack) if air.media else None
+        return Majorants(cells, strata)
 
     def scattered(
         self,
@@ -175,17 +176,25 @@ def _tally(
     first: Integer[Scalar, ""],
     blocks: Integer[Scalar, ""],
 ) -> Tally:
-    own = jax.vmap(lambda *look: of_look(solver.key, *look))(positions, directions)
+    key = quick(solver.key)
+    own = jax.vmap(lambda *look: of_look(key, *look))(positions, directions)
+    looks, count = positions.shape[0], max(quest.wavelength.shape[0], 1)
+    each = solver.walks, solver.paths, looks
 
     def trials(index):
         keys = jax.vmap(lambda key: jax.random.fold_in(key, index))(own)
-        keys = jax.vmap(lambda key: jax.random.split(key, solver.walks))(keys)
-        by_walk = jax.vmap(begin, (None, None, None, 0, None))
-        by_look = jax.vmap(by_walk, (None, 0, 0, 0, None))
-        trips = by_look(quest, positions, directions, keys, solver.paths)
-        onwards = jax.vmap(jax.vmap(lambda x: proceed(quest, x)))
-        found = ended(onwards, trips).total
-        return jnp.swapaxes(found, 0, 1) / solver.paths
+
+        def start(number):
+            look, number = number % looks, number // looks
+            path, walk = number % solver.paths, number // solver.paths
+            key = jax.random.fold_in(keys[look], walk)
+            hero = jax.random.randint(key, (), 0, count, jnp.int32) + path
+            key = jax.random.fold_in(key, path)
+            return begin(quest, positions[look], directions[look], key, hero % count)
+
+        onwards = lambda trip: proceed(quest, trip)
+        found = followed(start, onwards, math.prod(each))
+        return jnp.mean(found.reshape(*each, -1), 1)
 
     shape = (*positions.shape[:1], *quest.wavelength.shape)
     return joined(trials, first, blocks, jnp.zeros(shape, directions.dtype))
