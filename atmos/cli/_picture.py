@@ -77,8 +77,8 @@ def sky(
                 refuse(name, "must not stand beside --model", kind)
         if stokes != 1:
             refuse("--stokes", "must be 1 with --model", stokes)
-    solver = solver or default_solver(stokes)
-    check_bake(bake, solver)
+    chosen = solver or default_solver(stokes)
+    check_bake(bake, chosen)
     start()
 
     wavelength = np.array(files.wavelength or model.bands(kind), np.float32)
@@ -95,7 +95,7 @@ def sky(
         return
     step = (wavelength[-1] - wavelength[0]) / max(1, wavelength.size - 1) or 10.0
     found = make_scene(scene, world, sun, float(step))
-    method = solver_named(solver, stokes, float(camera.position[2]))
+    method = solver_named(chosen, stokes, float(camera.position[2]))
     aside = np.any(np.asarray(camera.position)[:2] != 0.0)
 
     def solved():

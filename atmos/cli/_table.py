@@ -76,12 +76,12 @@ def radiance(
     """
     if output is not None:
         check_output("--output", output)
-    solver = solver or default_solver(stokes)
-    check_bake(bake, solver)
+    chosen = solver or default_solver(stokes)
+    check_bake(bake, chosen)
     start(float64)
 
     found = load(scene)
-    method = solver_named(solver, stokes)
+    method = solver_named(chosen, stokes)
     bands = padded(np.array(wavelength, np.float64 if float64 else np.float32))
     if len(found.suns) != 1:
         if found.lights:
@@ -92,7 +92,7 @@ def radiance(
     suns = (own,) if sun_zenith is None else sun_zenith
     each = bool(method.baked(found).lights)  # solved for each sun
     if bake is not None and len(suns) > 1 and each:
-        refuse("--bake", f"serves one sun with --solver {solver}", len(suns))
+        refuse("--bake", f"serves one sun with --solver {chosen}", len(suns))
     axes = [np.array(x) for x in (altitude, view_zenith, azimuth)]
 
     def skies() -> Iterator[SolvedSky]:
