@@ -1,6 +1,7 @@
 """What every command does before its work, and beside it."""
 
 import contextlib
+import gc
 import os
 import sys
 import threading
@@ -14,14 +15,18 @@ from ..reference import cache_folder
 
 
 # XLA's newer emitters for CPUs compile twice as long, for code that is no faster.
-QUICK_TO_COMPILE = "--xla_cpu_use_fusion_emitters=false"
+_EMITTERS = "--xla_cpu_use_fusion_emitters=false"
+# To trace makes many objects, hardly any of which are garbage soon: looking for it as
+# often as Python does by itself takes a tenth of a short command.
+_OBJECTS = 200_000
 
 
 def start(double: bool = False) -> None:
     """Readies JAX: it compiles quickly, and keeps it, if there is a place to."""
+    gc.set_threshold(_OBJECTS)
     flags = os.environ.get("XLA_FLAGS", "")
     if "xla_cpu_use_fusion_emitters" not in flags:
-        os.environ["XLA_FLAGS"] = f"{flags} {QUICK_TO_COMPILE}".strip()
+        os.environ["XLA_FLAGS"] = f"{flags} {_EMITTERS}".strip()
     folder = cache_folder() / "jax"
     with contextlib.suppress(OSError):
         folder.mkdir(parents=True, exist_ok=True)
