@@ -28,7 +28,7 @@ def load(name):
 def test_skies(tmp_path):
     skies = load("skies")
     # By day and by light that turned once: the others are the same lines of code.
-    day = ["noon", "mars", "orbit"]
+    day = ["noon", "sunset", "mars", "orbit"]
     wanted = [x for x in skies.skies(8) if x[0] in day]
     pictures = skies.main(tmp_path, wanted, QUICK)
     assert {x.stem for x in tmp_path.iterdir()} == {*pictures, "skies"}
