@@ -264,7 +264,7 @@ def test_the_command_line_makes_a_bake_uses_it_and_refuses_what_does_not_fit(
     error = run("--solver shared --bake a.bake", 2).err
     assert error.count("\n") == 1
     assert "a.bake: serves another sky: `medium[0].scattering.value` is" in error
-    assert "is not for --solver single" in run("--bake a.bake", 2).err
+    assert "is not for --solver single" in run("--solver single --bake a.bake", 2).err
     error = run("--solver columns --bake b.bake --sun-zenith 40,60", 2).err
     assert "`--bake` serves one sun with --solver columns; got 2" in error
     error = run("--solver shared --bake no/b.bake", 2).err
