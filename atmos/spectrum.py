@@ -72,8 +72,9 @@ class Tabulated(AbstractSpectrum):
 
     @property
     def domain(self) -> tuple[float, float]:
-        low = float(self.knots[0]) if self.below is None else 0.0
-        high = float(self.knots[-1]) if self.above is None else math.inf
+        known = np.asarray(self.knots)  # even where others are being traced
+        low = float(known[0]) if self.below is None else 0.0
+        high = float(known[-1]) if self.above is None else math.inf
         return low, high
 
 
@@ -112,7 +113,8 @@ class BandAverage(AbstractSpectrum):
     @property
     def domain(self) -> tuple[float, float]:
         half = 0.5 * float(self.bandwidth)
-        return float(self.knots[0]) + half, float(self.knots[-1]) - half
+        known = np.asarray(self.knots)
+        return float(known[0]) + half, float(known[-1]) - half
 
 
 class Product(AbstractSpectrum):

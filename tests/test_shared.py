@@ -16,8 +16,10 @@ from atmos.medium import Ball, Exponential, Medium, Uniform
 from atmos.optics import mixture
 from atmos.phase import HenyeyGreenstein, Rayleigh
 from atmos.scene import Scene
+from atmos.sky import fine_enough
 from atmos.solver import Columns, Shared, SingleScattering, solve
 from atmos.solver._second import turns
+from atmos.spectrum import Constant, Tabulated
 
 
 NM = np.array([500.0])
@@ -211,3 +213,21 @@ def test_random_skies_have_slopes(depth, g, ground):
         assert "must not scatter more than an optical depth of 1" in str(refused)
         return
     assert np.all(np.isfinite(found))
+
+
+@pytest.mark.parametrize("solver", [SHARED, ONCE])
+def test_where_some_numbers_are_traced_a_panorama_is_no_finer(solver):
+    ground = Tabulated(np.array([400.0, 600.0]), np.array([0.1, 0.3]))
+    here, zenith = jnp.array([0.0, 0.0, 2.0]), math.radians(60.0)
+
+    air = Medium(Exponential(8e3), 0.0, 0.0, Rayleigh())
+    light = Sun.at(zenith, 0.0, Constant(1.0))
+    scene = Scene(Spherical(6.371e6), 1e5, (air,), (light,), ground)
+
+    def table(amount):
+        bright = eqx.tree_at(lambda x: x.media[0].scattering.value, scene, amount)
+        return solve(bright, solver, NM).panorama(here).table
+
+    rings = fine_enough(2.0, zenith, solver.around)
+    expected = 1, rings.above + rings.below, rings.around, 2, NM.size
+    assert jax.eval_shape(table, jnp.array(1e-5)).shape == expected

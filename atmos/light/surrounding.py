@@ -67,7 +67,8 @@ class Surrounding(AbstractLight):
         """The wavelengths between which this is known, in nm."""
         if self.knots.size == 1:
             return 0.0, math.inf
-        return float(self.knots[0]), float(self.knots[-1])
+        known = np.asarray(self.knots)
+        return float(known[0]), float(known[-1])
 
     @property
     def backdrop(self) -> bool:

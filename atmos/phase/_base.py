@@ -1,4 +1,6 @@
 import abc
+import math
+from typing import ClassVar
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -12,8 +14,11 @@ class AbstractPhaseFunction(eqx.Module):
 
     The angle of scattering is given by its versine, one minus its cosine: 0 when light
     goes straight on, 2 when it turns back. Narrow forward peaks need the digits that
-    the cosine would lose. The integral over the sphere is 1.
+    the cosine would lose. The integral over the sphere is 1. Beyond `degree` all
+    Legendre moments are 0.
     """
+
+    degree: ClassVar[float] = math.inf
 
     @abc.abstractmethod
     def evaluate(self, versine: Versine, wavelength: Wavelength) -> PhaseValue:

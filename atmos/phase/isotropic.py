@@ -1,3 +1,5 @@
+from typing import ClassVar
+
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, PRNGKeyArray
@@ -8,6 +10,8 @@ from ._base import AbstractPhaseFunction
 
 class Isotropic(AbstractPhaseFunction):
     """Every direction alike."""
+
+    degree: ClassVar[float] = 0
 
     def evaluate(self, versine: Versine, wavelength: Wavelength) -> PhaseValue:
         del wavelength

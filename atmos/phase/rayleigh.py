@@ -1,4 +1,5 @@
 import math
+from typing import ClassVar
 
 import equinox as eqx
 import jax
@@ -26,6 +27,7 @@ class Rayleigh(AbstractPhaseFunction):
     alike in all directions and without polarisation.
     """
 
+    degree: ClassVar[float] = 2
     depolarisation: AbstractSpectrum = eqx.field(converter=as_spectrum, default=0.0)
 
     def __check_init__(self):

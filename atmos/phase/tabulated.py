@@ -43,7 +43,8 @@ class Tabulated(AbstractPhaseFunction):
         """The wavelengths between which this is known, in nm."""
         if self.wavelength is None:
             return 0.0, math.inf
-        return float(self.wavelength[0]), float(self.wavelength[-1])
+        known = np.asarray(self.wavelength)
+        return float(known[0]), float(known[-1])
 
     def evaluate(self, versine: Versine, wavelength: Wavelength) -> PhaseValue:
         value = self._normalised(wavelength)

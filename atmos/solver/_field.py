@@ -145,7 +145,9 @@ class Field(AbstractField):
             start = jnp.minimum(jnp.min(first, -1), suns - width)
             spread = jax.vmap(jax.vmap(lambda i, by: _spread(i, by, width)))
             weights = spread(first - start[..., None], by_sun)
-            of_piece = lambda x: jax.vmap(self._source)(*x)
+            # Its gradient finds what was mixed anew: kept, it would fill the memory.
+            of_place = jax.checkpoint(lambda *x: self._source(*x), prevent_cse=False)
+            of_piece = lambda x: jax.vmap(of_place)(*x)
             places = density, *known, start, weights
             return lambda: jax.lax.map(of_piece, places)
 

@@ -53,11 +53,13 @@ class Peaks(eqx.Module):
     """The media of a scene without their forward peaks, and with all but their tips.
 
     `without` are the media that diffuse light notices, their peaks not scattered. Light
-    that turned once is to be found with the extinction of `within`.
+    that turned once is to be found with the extinction of `within`. Only the media that
+    are counted in `sharp` have peaks.
     """
 
     without: Mixture
     within: Mixture
+    sharp: tuple[int, ...] = eqx.field(static=True)
 
     @classmethod
     def of(
@@ -66,7 +68,12 @@ class Peaks(eqx.Module):
         """Peaks are what so many moments do not resolve."""
         broad = mixture(scene, wavelength, degrees + 1, stokes)
         fine = mixture(scene, wavelength, max(_DEGREES, degrees) + 1)
-        return cls(broad.truncated(), fine.truncated())
+        sharp = tuple(
+            i
+            for i, x in enumerate(scene.media)
+            if x.scattering is not None and x.phase.degree >= degrees
+        )
+        return cls(broad.truncated(), fine.truncated(), sharp)
 
     def scattered(
         self,
@@ -76,6 +83,8 @@ class Peaks(eqx.Module):
         sight: Sight,
     ) -> Radiance:
         """What light that turned in peaks adds to that which turned once."""
+        if not self.sharp:
+            return jnp.zeros_like(wavelength)
         path, far, length = sight.path, sight.far, sight.length
         gone, met = self.without.extinction, self.within.extinction
         u, w = (jnp.asarray(x, far.dtype) for x in gauss_legendre(_NODES))
@@ -131,11 +140,15 @@ class Peaks(eqx.Module):
     ) -> Float[Array, "wl"]:
         """Of light that passed such columns, `most` of which is left without peaks."""
         broad, fine = self.without.scattering, self.within.scattering
-        missing = fine.shape[1] - broad.shape[1]
-        broad = jnp.pad(broad, ((0, 0), (0, missing), (0, 0)))
-        peak = fine - broad
+        count, missing = broad.shape[1], fine.shape[1] - broad.shape[1]
         least = jnp.exp(-depth)
         once = contract("sm,sl->ml", event, most - least)
+        once = contract("ml,mkl->kl", once, broad)
+
+        of_sharp = lambda x: jnp.stack([x[..., i] for i in self.sharp], -1)
+        event, passed = of_sharp(event), of_sharp(passed)
+        narrow = [jnp.pad(broad[i], ((0, missing), (0, 0))) for i in self.sharp]
+        peak = jnp.stack([fine[i] - x for i, x in zip(self.sharp, narrow, strict=True)])
 
         # The moments along the way over that of degree 0, as on average.
         seen = contract("sm,ml->sl", event, peak[:, 0]) * most
@@ -156,8 +169,8 @@ class Peaks(eqx.Module):
             before, row = row, 2.0 * ratio * row - before
 
         lobe = legendre(versine, fine.shape[1])
-        source = broad * once[:, None] + peak * ratio[None] * mixed
-        return contract("k,mkl->l", lobe, source)
+        more = ratio * jnp.sum(peak * mixed, 0)
+        return contract("k,kl->l", lobe[:count], once) + contract("k,kl->l", lobe, more)
 
 
 def _orders(x: Array, depth: Array) -> Array:

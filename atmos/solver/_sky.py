@@ -96,15 +96,17 @@ class SolvedSky(AbstractSky):
         """All that one sees from `position`, made ready for millions of looks.
 
         Its zenith angles and azimuths are those at the origin, so the place must lie
-        straight above it: raises `ValueError` otherwise.
+        straight above it: raises `ValueError` otherwise. Where the place, the sun, or
+        the size of the world are traced, it is as fine as any of them might ask for.
         """
         if not isinstance(position, Tracer) and np.any(np.asarray(position)[:2] != 0.0):
             raise ValueError(
                 f"`position` must lie straight above the origin; got {position}."
             )
-        dip, _ = self._edges(position[2])
-        lowest = max((_known(x.zenith + dip) for x in self.scene.suns), default=0.0)
-        size = fine_enough(_known(position[2]), lowest, self.solver.around)
+        with jax.ensure_compile_time_eval():  # what is known stays so
+            dip, _ = self._edges(position[2])
+            lowest = max((_known(x.zenith + dip) for x in self.scene.suns), default=0.0)
+            size = fine_enough(_known(position[2]), lowest, self.solver.around)
         return _tabulate(self, position, size)
 
     @property

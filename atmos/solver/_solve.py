@@ -55,7 +55,8 @@ def admit(
             f"`scene.surfaces` must be empty, for this solver; got "
             f"{len(scene.surfaces)}."
         )
-    scene = jax.tree.map(lambda x: x.astype(nm.dtype), scene)
+    with jax.ensure_compile_time_eval():  # what is known stays so
+        scene = jax.tree.map(lambda x: x.astype(nm.dtype), scene)
     return solver.check(scene, nm), nm
 
 

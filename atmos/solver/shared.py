@@ -63,7 +63,9 @@ class Shared(AbstractDiffuse):
             return scene
         depth = _thickest(scene, wavelength)
         if isinstance(depth, Tracer):
-            return eqx.error_if(scene, depth > _THICKEST, f"`scene.media` {_RULE}.")
+            told = f"`scene.media` {_RULE}."
+            media = eqx.error_if(scene.media, depth > _THICKEST, told)
+            return dataclasses.replace(scene, media=media)
         if depth > _THICKEST:
             raise ValueError(f"`scene.media` {_RULE}; got {float(depth):.3g}.")
         return scene
