@@ -38,6 +38,8 @@ PARTS = {
     "multiple_scattering": Part("Path tracing itself", True, True, ("--slabs", "2000")),
     "polarisation": Part("Polarised light", True, True),
     "volumes": Part("Clouds and smoke", True, True),
+    "world": Part("Clouds in round air, and even light", True),
+    "film": Part("Pictures that grow", True),
     "gridfile": Part("OpenVDB files"),
     "fitted": Part("Fitted skies"),
     "panorama": Part("Tables of directions", True),
@@ -67,9 +69,8 @@ class Outcome(NamedTuple):
 def run(name: str, arguments: argparse.Namespace) -> Outcome:
     file = arguments.folder / f"{name}.json"
     command = [sys.executable, "-m", f"validation.{name}", *PARTS[name].more]
-    if name not in ("multiple_scattering", "envmap"):
-        command += ["--json", str(file)]
-    if name not in ("envmap", "speed"):
+    command += ["--json", str(file)]
+    if PARTS[name].tables:
         command += ["--truth", str(arguments.truth)]
     if name == "orders":
         command += ["--scenes", str(arguments.scenes)]
