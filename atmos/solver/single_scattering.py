@@ -8,7 +8,7 @@ from jaxtyping import Array, Bool, Float
 
 from ..geometry import AbstractPath, Point
 from ..light import Sun
-from ..quantity import Direction, Length, Position, Wavelength
+from ..quantity import Direction, dot, Length, Position, Wavelength
 from ..scene import Scene
 from ..transport import (
     columns,
@@ -93,7 +93,7 @@ class SingleScattering(AbstractSolver):
             # Where the ray meets the ground it has no digits to lose.
             altitude = jnp.where(last, 0.0, point.altitude)
             point = Point(point.position, altitude, point.up)
-            rise = jnp.dot(point.up, light.direction)
+            rise = dot(point.up, light.direction)
             return densities(scene, point), self._to_light(scene, light, point), rise
 
         every = jnp.append(places.ravel(), far)
