@@ -36,6 +36,11 @@ class SingleScattering(AbstractSolver):
     from there to the sun with `light_nodes`. Where there are more than `pieces`, the
     shortest are joined. With `stokes` 3 the light is polarised; its radiance is the
     same. Raises `ValueError` for other `stokes` than 1 and 3.
+
+    A thin sheet at the far end of a long ray has few of its places. A haze of depth 10,
+    seen from above, is right to 0.1 % where its scale height is 600 m and to 1 % where
+    that is 100 m. One of depth 1000 is right to 0.2 % where it is 1500 m, but off by up
+    to 40 % at 600 m: 30 `nodes` and 16 `light_nodes` make that 0.1 %.
     """
 
     around: ClassVar[int] = 9
