@@ -133,7 +133,7 @@ def rows(outcome: Outcome) -> str:
 
 def figure(path: pathlib.Path, text: str) -> str:
     if not path.exists():
-        return f"<p>No {html.escape(text.lower())}: {html.escape(str(path))}</p>"
+        return f"<p>{html.escape(text)}: there is no {html.escape(str(path))}.</p>"
     picture = base64.b64encode(path.read_bytes()).decode()
     source = f"data:image/png;base64,{picture}"
     return f'<h2>{html.escape(text)}</h2><img alt="{text}" src="{source}">'
@@ -219,6 +219,8 @@ def main() -> int:
     usual = [x for x in PARTS if arguments.all or not PARTS[x].long]
     wanted = list(arguments.part or usual)
 
+    idle = [x for x in PARTS if x not in wanted]
+
     missing = [x for x in PEERS if importlib.util.find_spec(x) is None]
     missing = [f"what needs {x}, which is not installed" for x in missing]
     tables = arguments.truth.is_dir()
@@ -227,7 +229,6 @@ def main() -> int:
     if "orders" in wanted and not (arguments.traced and arguments.traced.exists()):
         missing.append("all orders in the round: `--traced` names no file")
         wanted.remove("orders")
-    idle = [x for x in PARTS if x not in wanted]
     missing += [f"not asked for: {', '.join(idle)}"] if idle else []
     found = {}
     for name in wanted:
