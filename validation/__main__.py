@@ -188,8 +188,8 @@ def page(found: dict[str, Outcome], missing: list[str], chart, maps) -> str:
     names += ["of what is expected: a thousandth to thousandfold", ""]
     for name, x in found.items():
         parts.append(f'<h2 id="{name}">{PARTS[name].about}</h2>')
-        parts.append(f"<p><code>python -m validation.{name}</code>, {x.seconds:.0f} s")
-        parts.append(f", exit {x.code}</p>")
+        ended = f"{x.seconds:.0f} s, exit {x.code}"
+        parts.append(f"<p><code>python -m validation.{name}</code>, {ended}</p>")
         if x.claims:
             parts.append(table(names, rows(x)))
         said = html.escape(x.said)
