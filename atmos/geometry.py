@@ -11,7 +11,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
-from .quantity import Angle, as_float, Direction, Length, Number, Position, versine
+from .quantity import Angle, as_float, Direction, dot, Length, Number, Position, versine
 
 
 # A distance beyond every world, yet with a square that single precision can hold.
@@ -174,7 +174,7 @@ class Spherical(AbstractGeometry):
         return Point(position, altitude, from_centre / distance)
 
     def path(self, start: Point, direction: Direction) -> "SphericalPath":
-        rise = (self.radius + start.altitude) * jnp.dot(start.up, direction)
+        rise = (self.radius + start.altitude) * dot(start.up, direction)
         return SphericalPath(start, direction, self.radius, rise)
 
     def dip(self, altitude: Length, height: Length) -> Angle:
@@ -204,7 +204,7 @@ class SphericalPath(AbstractPath):
         # How low it will come, from the sine and the cosine at the start: from space
         # the sine has digits that one minus the square of the cosine has lost.
         across = jnp.cross(start.up, self.direction)
-        squared = jnp.dot(across, across)
+        squared = dot(across, across)
         aside = squared > 0.0
         sine = jnp.where(aside, jnp.sqrt(jnp.where(aside, squared, 1.0)), 0.0)
         cosine = self.rise / r
@@ -214,7 +214,7 @@ class SphericalPath(AbstractPath):
         half = jnp.where(enters, jnp.sqrt(jnp.where(enters, chord, 1.0)), 0.0)
         position = start.position + jnp.maximum(-half - self.rise, 0.0) * self.direction
         from_centre = position.at[2].add(self.radius)
-        up = from_centre / jnp.sqrt(jnp.dot(from_centre, from_centre))
+        up = from_centre / jnp.sqrt(dot(from_centre, from_centre))
         inner = Point(position, top, up), -half
         outer = self.start, self.rise
         start, rise = jax.tree.map(lambda x, y: jnp.where(enters, x, y), inner, outer)
@@ -255,7 +255,7 @@ class SphericalPath(AbstractPath):
         # The shadow is a cylinder of the planet's radius that starts at its centre.
         apart = versine(self.direction, sun)
         along = 1.0 - apart
-        ahead = self._from_centre * jnp.dot(self.start.up, sun)
+        ahead = self._from_centre * dot(self.start.up, sun)
         h = self.start.altitude
         a = jnp.maximum(apart * (2.0 - apart), _TINY)
         b = self.rise - ahead * along

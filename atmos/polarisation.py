@@ -10,7 +10,7 @@ one looks straight up or down, level is as if towards north.
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from .quantity import Angle, Direction, Number
+from .quantity import Angle, Direction, dot, Number
 
 
 def degree(stokes: Float[Array, "3 *n"]) -> Float[Array, "*n"]:
@@ -35,7 +35,7 @@ def angle(stokes: Float[Array, "3 *n"]) -> Float[Array, "*n"]:
 def frame(up: Direction, view: Direction) -> tuple[Direction, Direction]:
     """To the right and upwards, as one sees it in direction `view`."""
     right = jnp.cross(view, up)
-    squared = jnp.dot(right, right)
+    squared = dot(right, right)
     aside = squared > float(jnp.finfo(squared.dtype).tiny)
     right = right / jnp.sqrt(jnp.where(aside, squared, 1.0))
     right = jnp.where(aside, right, _east(view))
@@ -70,7 +70,7 @@ def vibration(
 ) -> tuple[Number, Number]:
     """The same, of directions of unit length."""
     right, upward = frame(up, view)
-    return across(jnp.dot(light, right), jnp.dot(light, upward))
+    return across(dot(light, right), dot(light, upward))
 
 
 def vibration_at(

@@ -49,6 +49,14 @@ def versine(a: Direction, b: Direction) -> Versine:
     return 0.5 * inner(apart, apart)
 
 
+def dot(a: Array, b: Array) -> Array:
+    """A product of vectors and matrices, in full precision.
+
+    Left to themselves GPUs round its factors to 10 bits.
+    """
+    return jnp.dot(a, b, precision="highest")
+
+
 def inner(a: Float[Array, "3"], b: Float[Array, "3"]) -> Number:
     """The scalar product, term by term: so it takes least time in large batches."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]

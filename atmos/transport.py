@@ -18,6 +18,7 @@ from .medium import AbstractProfile
 from .quantity import (
     Depth,
     Direction,
+    dot,
     Fraction,
     Irradiance,
     Length,
@@ -135,9 +136,9 @@ def optical_depth(
     path, far, _ = enter(scene, position, direction)
     if distance is not None:
         gone = path.start.position - position
-        far = jnp.clip(distance - jnp.dot(gone, direction), 0.0, far)
+        far = jnp.clip(distance - dot(gone, direction), 0.0, far)
     found = columns(scene, path, far, nodes=nodes)
-    return jnp.dot(found, extinctions(scene, wavelength), precision="highest")
+    return dot(found, extinctions(scene, wavelength))
 
 
 def transmittance(
@@ -162,9 +163,9 @@ def direct_irradiance(
     In W m^-2 nm^-1. The air weakens the disk strip by strip; the horizon may cut it.
     """
     here = scene.geometry.locate(position)
-    rise = jnp.dot(here.up, sun.direction)
+    rise = dot(here.up, sun.direction)
     level = sun.direction - rise * here.up
-    squared = jnp.dot(level, level)
+    squared = dot(level, level)
     aside = squared > 0.0
     length = jnp.where(aside, jnp.sqrt(jnp.where(aside, squared, 1.0)), 0.0)
     level = level / jnp.where(aside, length, 1.0)

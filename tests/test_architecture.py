@@ -110,6 +110,21 @@ def test_every_package_is_imported_by_one_file():
             assert path.is_relative_to(ROOT / KNOWN_BY[package]), (path, package)
 
 
+PRODUCTS = {"dot", "einsum", "inner", "matmul", "tensordot", "vdot", "vecdot"}
+
+
+@pytest.mark.parametrize("path", files(), ids=lambda x: str(x.relative_to(ROOT)))
+def test_products_of_arrays_are_in_full_precision(path):
+    """By default a GPU multiplies with 10 bits: a planet's radius is off by km."""
+    for node in ast.walk(ast.parse(path.read_text())):
+        if not isinstance(node, ast.Call) or not isinstance(node.func, ast.Attribute):
+            continue
+        whose, name = ast.unparse(node.func.value), node.func.attr
+        if whose in ("jnp", "lax", "jax.lax") and (name in PRODUCTS or "dot" in name):
+            given = {x.arg: ast.unparse(x.value) for x in node.keywords}
+            assert given.get("precision") == "'highest'", f"line {node.lineno}"
+
+
 def classes():
     for info in pkgutil.walk_packages(atmos.__path__, "atmos."):
         module = importlib.import_module(info.name)

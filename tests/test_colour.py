@@ -94,15 +94,26 @@ def test_a_narrow_light_is_as_bright_as_it_looks():
     np.testing.assert_allclose(to_xyz(green, nm)[1], 683.0, rtol=1e-12)
 
 
-@every_light
-def test_sunlight_has_the_colour_of_a_1_nm_integration(airs, judge):
+def difference(judge, airs, wavelength, bandwidth):
+    """CIEDE2000, of colours of luminance 1 under the white D65."""
     exact = exact_xyz(airs)
-    coarse = np.asarray(to_xyz(through(airs, GRID, 10.0), GRID))
-    # Each light is shown as a colour of luminance 1 under the white D65.
+    coarse = np.asarray(to_xyz(through(airs, wavelength, bandwidth), wavelength))
     one, other = (
         judge.XYZ_to_Lab(xyz / exact[1], np.array(D65)) for xyz in (coarse, exact)
     )
-    assert judge.delta_E(one, other, method="CIE 2000") < 0.5
+    return float(judge.delta_E(one, other, method="CIE 2000"))
+
+
+@every_light
+def test_sunlight_has_the_colour_of_a_1_nm_integration(airs, judge):
+    assert difference(judge, airs, GRID, 10.0) < 0.5
+
+
+def test_three_wavelengths_are_too_few_for_a_low_sun(judge):
+    """As those that Bruneton's tables and Unreal's sky are made of."""
+    few = jnp.array([440.0, 550.0, 680.0])
+    noon, _, horizon = (difference(judge, airs, few, 10.0) for airs in AIRS)
+    assert noon > 2.0 and horizon > 15.0
 
 
 @every_light

@@ -401,6 +401,30 @@ def test_level_air_tends_to_the_light_it_turns():
     assert np.all(far[1] > 0.0)
 
 
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_the_air_before_a_thing_grows_with_its_distance(dtype):
+    """From none and in proportion at first; at the horizon as beside it."""
+    sky = jax.tree.map(lambda x: x.astype(dtype), hazy())
+    distances = np.geomspace(1e-4, 1e5, 46).astype(dtype)
+    tilts = np.array([-1e-3, -1e-6, 0.0, 1e-6, 1e-3])
+    views = np.stack([0.6 + 0 * tilts, 0.8 + 0 * tilts, tilts], -1).astype(dtype)
+
+    @eqx.filter_jit
+    @ft.partial(jax.vmap, in_axes=(None, 0, None))
+    @ft.partial(jax.vmap, in_axes=(None, None, 0))
+    def look(sky, view, distance):
+        eye = (100.0 * ZENITH).astype(dtype)
+        return sky.aerial_perspective(eye, view, distance)
+
+    left, added = map(np.asarray, look(sky, views, distances))
+    assert np.all((left > 0.0) & (left <= 1.0) & (added > 0.0))
+    falls, grows = np.diff(left, axis=1), np.diff(added, axis=1)
+    assert np.all(falls <= 0.0) and np.all(grows > -1e-6 * added[:, 1:])
+    near = added[:, distances < 1.0] / distances[distances < 1.0, None]
+    np.testing.assert_allclose(near, near[:, :1] + 0.0 * near, rtol=1e-4)
+    np.testing.assert_allclose(added[1:4:2], added[2] + 0.0 * added[1:4:2], rtol=1e-4)
+
+
 # --- Hosek and Wilkie 2012
 
 

@@ -293,6 +293,19 @@ def test_what_cannot_be_traced_is_refused():
         estimate(sky, jnp.zeros(3), jnp.array([0.0, 0.0, 1.0]))
 
 
+@pytest.mark.parametrize("mode", [jax.jacfwd, jax.grad])
+def test_slopes_are_refused(mode):
+    """Without what paths draw by chance they would be off by half."""
+
+    def look(depth):
+        sky = eqx.tree_at(lambda x: x.scene.media[0].profile.top, thick, depth)
+        return sky.radiance(jnp.zeros(3), jnp.array([0.6, 0.0, 0.8]))[0]
+
+    thick = slab(1.0, 0.9, 0.5, 0.5)
+    with pytest.raises(RuntimeError, match="`PathTracing` has no gradients; `Single"):
+        mode(look)(jnp.array(1.0))
+
+
 SHARE, LOBE = within(0.0, 1.0), within(-0.99, 0.99, 0.0)
 SUN = within(1e-3, 1.0)
 

@@ -399,6 +399,21 @@ def test_a_table_keeps_its_peak_in_single_precision():
     np.testing.assert_allclose(found / found[-1], [2e6, 1e6, line, 1e3, 1.0], rtol=1e-5)
 
 
+@dtypes
+def test_a_table_that_is_dense_ahead_keeps_a_narrow_lobe(dtype):
+    """Angles spaced as a square: with even ones the peak of g 0.98 is lost."""
+    angle = np.pi * np.linspace(0.0, 1.0, 600) ** 2
+    g, versines = 0.98, 2.0 * np.sin(0.5 * angle) ** 2
+    lobe = lambda x: (1.0 - g * g) / ((1.0 - g) ** 2 + 2.0 * g * x) ** 1.5 / (4 * np.pi)
+    cosine = 1.0 - versines[::-1]
+    tabulated = phase.Tabulated(cosine, lobe(versines)[::-1].astype(dtype))
+    known = np.asarray(moments(tabulated, dtype))[:4, 0]
+    np.testing.assert_allclose(known, g ** np.arange(4), rtol=1e-4)
+    between = 2.0 * np.sin(0.25 * (angle[1:] + angle[:-1])) ** 2
+    found = evaluate(tabulated, jnp.asarray(between, dtype))[:, 0]
+    np.testing.assert_allclose(found, lobe(between), rtol=2e-3)
+
+
 def test_angles_that_single_precision_cannot_tell_apart_are_one():
     behind = -1.0 + 1e-9 * np.arange(9.0)
     tabulated = in_dtype(table([*behind, 1.0], np.arange(10.0)), jnp.float32)

@@ -224,6 +224,25 @@ def test_a_cache_of_shadows_serves_all_places_and_lights():
     assert np.mean(off) < 0.01 and np.max(off) < 0.1
 
 
+def test_a_cache_of_shadows_keeps_amounts_and_not_what_arrives():
+    """So that between its nodes a deep shadow is as exact as a faint one."""
+    away = np.linspace(-1.0, 1.0, 33) ** 2
+    values = np.exp(-4.0 * (away[:, None, None] + away[:, None] + away))
+    thick = Medium(Grid(values, LOWER, UPPER), 10.0)
+    world = scene(thick, sun=SLANT)
+    places = jnp.asarray(rng.uniform(LOWER, UPPER, (20_000, 3)))
+    arrives = []
+    for shadows in (ShadowCache(), ShadowRays()):
+        found = shadows.towards(shadows.prepare(world), world, world.lights[0])
+        at = jax.jit(lambda x, found=found: found(world.geometry.locate(x))[0])
+        arrives.append(
+            np.exp(-10.0 * np.asarray(jax.lax.map(at, places, batch_size=4096)))
+        )
+    off = np.abs(arrives[0] / arrives[1] - 1.0)
+    assert arrives[1].min() < 1e-3
+    assert np.percentile(off, 99.0) < 0.02 and np.median(off) < 0.005
+
+
 def test_layered_air_is_that_of_single_scattering():
     air = Medium(Exponential(8e3), PowerLaw(1.2e-5, -4.0), phase=Rayleigh())
     dust = Medium(Exponential(1.2e3), 2e-5, 5e-6, HenyeyGreenstein(0.7))

@@ -119,6 +119,8 @@ def test_of_what_absorbs_less_comes_back():
         (numbers(1.0), 0.055, 0.17),
         (numbers(0.1, 0.1, 0.7, ground=0.2), 0.03, 0.06),
         (numbers(0.1, 0.4, 0.7, 0.9, ground=0.2), 0.06, 0.17),
+        # A low sun in haze: nearly all comes from ahead, and it does not know of that.
+        (numbers(0.1, 0.5, 0.76, 0.95, cosine=0.087, ground=0.2), 0.3, 2.4),
     ],
 )
 def test_slabs_are_nearly_as_bright_as_by_discrete_ordinates(scene, mean, most):

@@ -181,19 +181,25 @@ def test_what_is_not_absorbed_leaves():
     assert leaves == pytest.approx(met, rel=2e-3)
 
 
+@eqx.filter_jit
+def mean(given, ahead):
+    """Of what one sees by day, and its slope: by depth, haze, white, ground, radius."""
+
+    def look(given):
+        depth, haze, white, ground, radius = given
+        scene = world(depth, haze, white, ground, radius)
+        return jnp.mean(see(solve(scene, SHELLS, NM), DAY[1], VIEWS, EYE))
+
+    return jax.jvp(look, (given,), (ahead,))
+
+
 def test_slopes_agree_with_differences():
     """Of light that the ground returns, whose every order has a part in them."""
-
-    @jax.jit
-    def mean(ground):
-        sky = solve(numbers(ground=ground), SHELLS, NM)
-        return jnp.mean(see(sky, DAY[1], VIEWS, EYE))
-
-    at, step = jnp.array(0.3), 1e-4
-    _, slope = jax.jvp(mean, (at,), (jnp.ones_like(at),))
-    due = (mean(at + step) - mean(at - step)) / (2.0 * step)
+    at, step = jnp.array([0.2, 0.1, 0.9, 0.3, RADIUS]), 1e-4 * jnp.eye(5)[3]
+    _, slope = mean(at, step)
+    more, less = (mean(at + x, step)[0] for x in (step, -step))
     # Both are as exact as the tolerance of the solution.
-    assert float(slope) == pytest.approx(float(due), rel=3e-5)
+    assert float(slope) == pytest.approx(0.5 * float(more - less), rel=3e-5)
 
 
 def test_a_fixed_point_has_exact_slopes():
@@ -262,3 +268,15 @@ def test_random_skies_are_bright_or_refused(depth, haze, white, ground, radius, 
             assert np.all(np.isfinite(seen)), (zenith, altitude)
             # By night cubics swing below nothing, by less than a sun of 1 leaves there.
             assert np.all(seen >= -1e-15), (zenith, altitude, seen)
+
+
+@drawn(6)
+@given(DEPTH, DEPTH, SHARE, SHARE, PLANET)
+def test_random_airs_have_slopes_or_are_refused(depth, haze, white, ground, radius):
+    at = jnp.array([depth, haze, white, ground, radius])
+    try:
+        found = mean(at, jnp.ones(5))
+    except RuntimeError as refused:
+        assert "`tolerance` must be reached" in str(refused)
+        return
+    assert np.all(np.isfinite(found)), (found, at)

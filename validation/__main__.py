@@ -38,6 +38,8 @@ PARTS = {
     "multiple_scattering": Part("Path tracing itself", True, True, ("--slabs", "2000")),
     "polarisation": Part("Polarised light", True, True),
     "volumes": Part("Clouds and smoke", True, True),
+    "world": Part("Clouds in round air, and even light", True),
+    "film": Part("Pictures that grow", True),
     "gridfile": Part("OpenVDB files"),
     "fitted": Part("Fitted skies"),
     "panorama": Part("Tables of directions", True),
@@ -67,9 +69,8 @@ class Outcome(NamedTuple):
 def run(name: str, arguments: argparse.Namespace) -> Outcome:
     file = arguments.folder / f"{name}.json"
     command = [sys.executable, "-m", f"validation.{name}", *PARTS[name].more]
-    if name not in ("multiple_scattering", "envmap"):
-        command += ["--json", str(file)]
-    if name not in ("envmap", "speed"):
+    command += ["--json", str(file)]
+    if PARTS[name].tables:
         command += ["--truth", str(arguments.truth)]
     if name == "orders":
         command += ["--scenes", str(arguments.scenes)]
@@ -132,7 +133,7 @@ def rows(outcome: Outcome) -> str:
 
 def figure(path: pathlib.Path, text: str) -> str:
     if not path.exists():
-        return f"<p>No {html.escape(text.lower())}: {html.escape(str(path))}</p>"
+        return f"<p>{html.escape(text)}: there is no {html.escape(str(path))}.</p>"
     picture = base64.b64encode(path.read_bytes()).decode()
     source = f"data:image/png;base64,{picture}"
     return f'<h2>{html.escape(text)}</h2><img alt="{text}" src="{source}">'
@@ -149,25 +150,49 @@ td, th { text-align: left; padding: 2px 8px; border-bottom: 1px solid #ddd }
 """
 
 
+def overview(found: dict[str, Outcome]) -> str:
+    """A line for each part, which leads to it."""
+    lines = []
+    for name, x in found.items():
+        held = sum(y["verdict"] == "ok" for y in x.claims)
+        failed = sum(y["verdict"] == "FAILED" for y in x.claims)
+        state = "FAILED" if x.failed else "ok" if x.claims else "claims nothing"
+        cells = [str(held), str(failed), f"{x.seconds:.0f} s", state]
+        kind = "failed" if x.failed else ""
+        link = f'<a href="#{name}">{html.escape(PARTS[name].about)}</a>'
+        told = "".join(f"<td>{y}</td>" for y in (link, *cells))
+        lines.append(f'<tr class="{kind}">{told}</tr>')
+    names = ["", "claims that hold", "that fail", "time", ""]
+    return table(names, "\n".join(lines))
+
+
+def table(names: list[str], lines: str) -> str:
+    head = "".join(f"<th>{x}</th>" for x in names)
+    return f"<table><tr>{head}</tr>\n{lines}</table>"
+
+
 def page(found: dict[str, Outcome], missing: list[str], chart, maps) -> str:
     every = [x for outcome in found.values() for x in outcome.claims]
     held = sum(x["verdict"] == "ok" for x in every)
     failed = [name for name, x in found.items() if x.failed]
     head = f"{held} claims hold"
     head += f"; failed: {', '.join(failed)}" if failed else "; none fails"
-    parts = [f"<!doctype html><meta charset=utf-8><title>atmos</title><style>{STYLE}"]
-    parts += [f"</style><h1>What atmos claims, measured</h1><p><b>{head}.</b></p>"]
-    parts += ["<ul>", *(f"<li>left out: {html.escape(x)}</li>" for x in missing)]
-    parts += ["</ul>", figure(chart, "Speed and accuracy"), figure(maps, "Maps")]
-    names = ["claim", "source", "expected at most", "measured", "", ""]
-    columns = "".join(f"<th>{x}</th>" for x in names)
-    for name, outcome in found.items():
-        parts.append(
-            f"<h2>{PARTS[name].about}</h2><p><code>python -m validation.{name}"
-        )
-        parts.append(f"</code>, {outcome.seconds:.0f} s, exit {outcome.code}</p>")
-        parts.append(f"<table><tr>{columns}</tr>{rows(outcome)}</table>")
-        said = html.escape(outcome.said)
+    parts = ['<!doctype html><html lang="en"><meta charset="utf-8">']
+    parts += [f"<title>What atmos claims</title><style>{STYLE}</style>"]
+    parts += ["<h1>What atmos claims, measured</h1>", f"<p><b>{head}.</b></p>"]
+    parts += [overview(found), "<ul>"]
+    parts += [f"<li>left out: {html.escape(x)}</li>" for x in missing]
+    parts += ["</ul>", figure(chart, "Speed and accuracy")]
+    parts += [figure(maps, "Where methods go wrong")]
+    names = ["claim", "source", "expected at most", "measured"]
+    names += ["of what is expected: a thousandth to thousandfold", ""]
+    for name, x in found.items():
+        parts.append(f'<h2 id="{name}">{PARTS[name].about}</h2>')
+        ended = f"{x.seconds:.0f} s, exit {x.code}"
+        parts.append(f"<p><code>python -m validation.{name}</code>, {ended}</p>")
+        if x.claims:
+            parts.append(table(names, rows(x)))
+        said = html.escape(x.said)
         parts.append(f"<details><summary>in full</summary><pre>{said}</pre></details>")
     return "\n".join(parts)
 
@@ -191,7 +216,10 @@ def main() -> int:
     parser.add_argument("--chart", type=pathlib.Path, default=pathlib.Path("chart"))
     arguments = parser.parse_args()
     arguments.folder.mkdir(parents=True, exist_ok=True)
-    wanted = arguments.part or [x for x in PARTS if arguments.all or not PARTS[x].long]
+    usual = [x for x in PARTS if arguments.all or not PARTS[x].long]
+    wanted = list(arguments.part or usual)
+
+    idle = [x for x in PARTS if x not in wanted]
 
     missing = [x for x in PEERS if importlib.util.find_spec(x) is None]
     missing = [f"what needs {x}, which is not installed" for x in missing]
@@ -200,8 +228,8 @@ def main() -> int:
         missing.append(f"what reads published tables: {arguments.truth} is no folder")
     if "orders" in wanted and not (arguments.traced and arguments.traced.exists()):
         missing.append("all orders in the round: `--traced` names no file")
-        wanted = [x for x in wanted if x != "orders"]
-    missing += [f"{x}: not asked for" for x in PARTS if x not in wanted]
+        wanted.remove("orders")
+    missing += [f"not asked for: {', '.join(idle)}"] if idle else []
     found = {}
     for name in wanted:
         if PARTS[name].tables and not tables:

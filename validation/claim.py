@@ -40,7 +40,8 @@ def main(
     options(parser)
     arguments = parser.parse_args()
     found = list(claims(arguments))
-    print(f"{'claim':60} {'source':28} {'expected':>9} {'measured':>9}  verdict")
+    if found:
+        print(f"{'claim':60} {'source':28} {'expected':>9} {'measured':>9}  verdict")
     for x in found:
         bar = "" if x.expected is None else f"{x.expected:.2g}"
         print(f"{x.claim:60} {x.source:28} {bar:>9} {x.measured:9.4g}  {x.verdict}")

@@ -54,9 +54,10 @@ def claims(arguments: argparse.Namespace) -> Iterator[Claim]:
     interpreter = os.environ.get("OPENVDB_PYTHON", "/usr/bin/python3")
     with tempfile.TemporaryDirectory() as folder:
         try:
-            subprocess.run([interpreter, "-c", WRITER, folder], check=True)
+            command = [interpreter, "-c", WRITER, folder]
+            subprocess.run(command, check=True, capture_output=True)
         except (OSError, subprocess.CalledProcessError):
-            print(f"skipped: {interpreter} has no OpenVDB", file=sys.stderr)
+            print(f"{interpreter} has no OpenVDB: skipped.")
             return
         for path in sorted(pathlib.Path(folder).glob("*.vdb")):
             due = np.load(path.with_suffix(".npy"))

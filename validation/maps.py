@@ -13,6 +13,7 @@ The figures go to `maps.json`, the maps to `maps.png`.
 """
 
 import argparse
+import functools as ft
 import importlib.util
 import json
 import math
@@ -30,6 +31,7 @@ import atmos
 from atmos import deg, geometry, km, light, medium, phase, spectrum
 from atmos.solver import (
     AbstractSolver,
+    Bruneton,
     Columns,
     Fixed,
     RayMarching,
@@ -51,6 +53,7 @@ ALBEDOS = [0.5, 0.9, 0.99, 0.999999, 1.0]
 ASYMMETRIES = [0.0, 0.5, 0.75, 0.85, 0.95]
 STREAMS = [4, 8, 16, 32]
 STEPS = [4, 16, 64, 256]
+NODES = [4, 8, 12, 16]
 
 
 class Map(NamedTuple):
@@ -63,7 +66,7 @@ class Map(NamedTuple):
     errors: dict[str, np.ndarray]
 
 
-def world(aerosol) -> atmos.Scene:
+def world(aerosol: float, elevation: float) -> atmos.Scene:
     """Air, an aerosol of this depth at 550 nm, and ground."""
     air, dust = 8.0 * km, 1.2 * km
     media = (
@@ -76,20 +79,22 @@ def world(aerosol) -> atmos.Scene:
             spectrum.PowerLaw(aerosol / dust, -1.0, 550.0),
             spectrum.Constant(0.95),
             medium.Exponential(dust),
-            phase.HenyeyGreenstein(0.7),
+            phase=phase.HenyeyGreenstein(0.7),
         ),
     )
-    sun = light.Sun.at(0.5, 0.0, spectrum.Constant(1.0), 0.0)
+    sun = light.Sun.at((90.0 - elevation) * deg, 0.0, spectrum.Constant(1.0), 0.0)
     return atmos.Scene(geometry.Spherical(6371.0 * km), 60.0 * km, media, (sun,), 0.2)
 
 
+UP = [1.0, 15.0, 30.0, 45.0, 60.0, 70.0, 75.0, 80.0, 83.0, 85.0, 87.0, 88.0]
+BOTH = [1.0, 30.0, 60.0, 75.0, 85.0, 88.0, 91.0, 93.0, 96.0, 110.0, 150.0, 179.0]
+DOWN = [107.0, 108.0, 108.5, 109.0, 109.5, 110.0, 112.0, 115.0, 120.0, 130.0, 150.0]
+DOWN += [179.0]  # from 400 km the horizon is at 109.8 degrees
+
+
 def looks(altitude: float) -> np.ndarray:
-    """From within the air up to 2 degrees from level, from above it downwards."""
-    low = [91.0, 93.0, 96.0, 110.0, 150.0, 179.0]
-    if altitude > 60.0:  # at the limb and at the ground
-        low = [109.5, 109.0, 108.0, 130.0, 150.0, 179.0]
-    zeniths = [1.0, 30.0, 60.0, 75.0, 85.0, 88.0] if altitude < 60.0 else low
-    zeniths += low if 0.0 < altitude < 60.0 else []
+    """Not level, from within the air; from above it at the limb and at the ground."""
+    zeniths = DOWN if altitude > 60.0 else BOTH if altitude > 0.0 else UP
     turned = np.meshgrid(zeniths, [0.0, 20.0, 90.0, 180.0], indexing="ij")
     return vectors(*(x.ravel() for x in turned)).astype(float)
 
@@ -103,11 +108,16 @@ def see(sky, altitude, elevation, directions):
     return jax.vmap(sky.radiance, (None, 0))(place, directions)
 
 
-def lit(scene, solver: AbstractSolver, elevation, altitude, dtype=float) -> np.ndarray:
+@ft.lru_cache(maxsize=24)
+def solved(aerosol, solver, elevation, dtype):
+    return atmos.solve(world(aerosol, elevation), solver, NM.astype(dtype))
+
+
+def lit(solver: AbstractSolver, aerosol, elevation, altitude, dtype=float):
     """Radiances; raises `ValueError` where the solver does."""
-    sun = light.Sun.at((90.0 - elevation) * deg, 0.0, spectrum.Constant(1.0), 0.0)
-    scene = eqx.tree_at(lambda x: x.lights, scene, (sun,))
-    sky = atmos.solve(scene, solver, NM.astype(dtype))
+    scene = world(aerosol, elevation)
+    every = not solver.baked(scene).lights  # what is worked out serves every sun
+    sky = solved(aerosol, solver, ELEVATIONS[0] if every else elevation, dtype)
     numbers = jnp.asarray(altitude * km, dtype), jnp.asarray(elevation * deg, dtype)
     found = see(sky, *numbers, jnp.asarray(looks(altitude), dtype))
     return np.asarray(found, float)
@@ -137,33 +147,32 @@ def table(
     return found
 
 
-ORDERS = {"columns": Columns(), "shared": Shared(), "single": SingleScattering()}
+ORDERS = {
+    "columns": Columns(),
+    "shared": Shared(),
+    "bruneton": Bruneton(),
+    "single": SingleScattering(),
+}
 
 
 def clear_air() -> Iterator[Map]:
-    # What is solved for all suns serves all cells of a row.
-    truth = Shells(layers=32, suns=48, degrees=12, azimuths=10)
-    due = {
-        (x, y): lit(world(y), truth, x, 0.0) for y in AEROSOLS for x in ELEVATIONS[:7]
-    }
+    truth, suns = Shells(), ELEVATIONS[:7]
+    due = {(y, x): lit(truth, y, x, 0.0) for y in AEROSOLS for x in suns}
     yield Map(
         "sun and aerosol, from the ground",
         "shells",
-        ("sun's elevation, degrees", ELEVATIONS[:7]),
         ("optical depth of the aerosol", AEROSOLS),
+        ("sun's elevation, degrees", suns),
         {
             name: table(
-                ELEVATIONS[:7],
-                AEROSOLS,
-                lambda x, y, s=s: apart(lit(world(y), s, x, 0.0), due[x, y]),
+                AEROSOLS, suns, lambda y, x, s=s: apart(lit(s, y, x, 0.0), due[y, x])
             )
             for name, s in ORDERS.items()
         },
     )
-    scene = world(0.1)
-    due = {(h, x): lit(scene, truth, x, h) for h in ALTITUDES for x in ELEVATIONS}
+    due = {(h, x): lit(truth, 0.1, x, h) for h in ALTITUDES for x in ELEVATIONS}
     yield Map(
-        "altitude and sun",
+        "altitude and sun, aerosol 0.1",
         "shells",
         ("altitude, km", ALTITUDES),
         ("sun's elevation, degrees", ELEVATIONS),
@@ -171,29 +180,29 @@ def clear_air() -> Iterator[Map]:
             name: table(
                 ALTITUDES,
                 ELEVATIONS,
-                lambda h, x, s=s: apart(lit(scene, s, x, h), due[h, x]),
+                lambda h, x, s=s: apart(lit(s, 0.1, x, h), due[h, x]),
             )
             for name, s in ORDERS.items()
         },
     )
 
 
-def precisions() -> Iterator[Map]:
-    scene, found = world(0.1), {}
-    solvers = {"single": SingleScattering(), "shells": Shells(layers=24, suns=48)}
-    for name, solver in (solvers | {"columns": Columns()}).items():
+def precisions() -> Map:
+    def figure(solver, h, x):
+        single = lit(solver, 0.1, x, h, np.float32)
+        return apart(single, lit(solver, 0.1, x, h))
 
-        def figure(h, x, solver=solver):
-            single = lit(scene, solver, x, h, np.float32)
-            return apart(single, lit(scene, solver, x, h))
-
-        found[name] = table(ALTITUDES, ELEVATIONS, figure)
-    yield Map(
-        "float32",
+    # What `Shared` looks up is made as that of columns.
+    methods = {k: v for k, v in ORDERS.items() if k != "shared"} | {"shells": Shells()}
+    return Map(
+        "float32, altitude and sun",
         "float64",
         ("altitude, km", ALTITUDES),
         ("sun's elevation, degrees", ELEVATIONS),
-        found,
+        {
+            name: table(ALTITUDES, ELEVATIONS, lambda h, x, s=s: figure(s, h, x))
+            for name, s in methods.items()
+        },
     )
 
 
@@ -231,7 +240,7 @@ def slabs() -> Iterator[Map]:
 
     usual = Columns(streams=16)
     yield Map(
-        "depth and albedo, a slab of g 0.75",
+        "depth and albedo, g 0.75",
         "CDISORT, 128 streams",
         ("optical depth", DEPTHS),
         ("single-scattering albedo", ALBEDOS),
@@ -244,7 +253,7 @@ def slabs() -> Iterator[Map]:
         },
     )
     yield Map(
-        "peaks and streams, a slab of depth 1",
+        "peaks and streams, depth 1",
         "CDISORT, 128 streams",
         ("asymmetry g", ASYMMETRIES),
         ("streams", STREAMS),
@@ -271,47 +280,41 @@ def once(solver, depth, directions):
     return jax.vmap(sky.radiance, (None, 0))(top, directions)[:, 0]
 
 
-def steps() -> Map:
+def steps() -> Iterator[Map]:
     """Light that turned once in a slab, seen from above."""
     up = COSINES[COSINES > 0.0]
     views = np.stack([np.sqrt(1.0 - up**2), 0.0 * up, -up], -1)
+    depths = [*DEPTHS, 1000.0]
 
     def due(depth):
         whole = -np.expm1(-depth * (1.0 / SUN + 1.0 / up))
         return SUN / (SUN + up) * whole / (4.0 * math.pi)
 
-    depths = [*DEPTHS, 1000.0]
-    methods = {
-        "ray marching, fixed steps": lambda n: RayMarching(Fixed(int(n))),
-        "single scattering, nodes": lambda n: SingleScattering(
-            nodes=int(math.log2(n) * 2), light_nodes=8
-        ),
-    }
-    return Map(
-        "steps and depth, light that turned once",
-        "closed form",
-        ("steps (nodes: 4, 8, 12, 16)", STEPS),
-        ("optical depth", depths),
-        {
-            name: table(
-                STEPS,
-                depths,
-                lambda n, t, make=make: apart(
-                    np.asarray(once(make(n), jnp.array(t), views)), due(t)
-                ),
-            )
-            for name, make in methods.items()
-        },
+    methods = (
+        ("ray marching", "steps", STEPS, lambda n: RayMarching(Fixed(n))),
+        ("single", "nodes a piece", NODES, lambda n: SingleScattering(nodes=n)),
     )
+    for name, which, counts, make in methods:
+
+        def figure(n, depth, make=make):
+            return apart(np.asarray(once(make(n), jnp.array(depth), views)), due(depth))
+
+        yield Map(
+            f"{which} and depth, light that turned once",
+            "a closed form",
+            (which, counts),
+            ("optical depth", depths),
+            {name: table(counts, depths, figure)},
+        )
 
 
 def maps() -> Iterator[Map]:
-    yield steps()
+    yield from steps()
     if importlib.util.find_spec("nanodisort") is None:
         print("nanodisort is not installed: slabs are left out")
     else:
         yield from slabs()
-    yield from precisions()
+    yield precisions()
     yield from clear_air()
 
 

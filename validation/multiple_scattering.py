@@ -35,6 +35,8 @@ import atmos
 from atmos import geometry, km, light, medium, phase, scenefile, spectrum
 from atmos.solver import PathTracing, SingleScattering, solve
 
+from .claim import Claim, main
+
 
 WAVELENGTH = np.array([380.0, 450.0, 550.0, 650.0, 770.0], np.float32)
 SCENES = ["r", "ra", "rao"]
@@ -347,29 +349,38 @@ def disort_radiances(folder: pathlib.Path, count: int) -> Iterator[tuple[float, 
         yield from zip(z, error / right, strict=True)
 
 
-def judge(folder: pathlib.Path, count: int) -> bool:
+def judge(folder: pathlib.Path, count: int) -> Iterator[Claim]:
     """Are the z-scores of path tracing a standard normal's?"""
-    good = True
     for name, scores in [("slabs", slab_fluxes), ("DISORT", disort_radiances)]:
         z, errors = np.array(list(scores(folder, count))).T
-        n, outside = len(z), np.mean(np.abs(z) > 3.0)
-        print(
-            f"{name}: {n} values, standard errors {np.median(errors):.2%} (median) to "
-            f"{errors.max():.2%}; z-scores: mean {z.mean():.2f}, standard deviation "
-            f"{z.std():.2f}, largest {np.abs(z).max():.1f}, beyond three {outside:.1%}"
-        )
-        good &= abs(z.mean()) < 3.0 / math.sqrt(n) + 0.05 and 0.8 < z.std() < 1.25
-        good &= outside < 0.02
-    return good
+        source = f"{len(z)} values of {name}"
+        bar = 3.0 / math.sqrt(len(z)) + 0.05
+        yield Claim(f"{name}: mean of z-scores", source, bar, abs(z.mean()))
+        apart = max(z.std(), 1.0 / z.std())
+        text = "    standard deviation, or one over it"
+        yield Claim(text, source, 1.25, apart)
+        outside = np.mean(np.abs(z) > 3.0)
+        yield Claim("    share beyond three", source, 0.02, outside)
+        yield Claim("    largest", source, None, np.abs(z).max())
+        text = "    standard errors, relative: median"
+        yield Claim(text, source, None, np.median(errors))
 
 
-def main() -> int:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+def claims(arguments: argparse.Namespace) -> Iterator[Claim]:
+    """Of path tracing; traces truth and compares solvers with it first, if asked."""
+    if arguments.out:
+        truth = Truth(arguments.out)
+        make(truth, arguments)
+        for name in arguments.solver:
+            compare(truth, name, arguments)
+    if arguments.slabs:
+        yield from judge(arguments.truth, arguments.slabs)
+
+
+def options(parser: argparse.ArgumentParser) -> None:
     shared = pathlib.Path("../shared")
+    parser.set_defaults(truth=shared / "truth")
     parser.add_argument("--scenes", type=pathlib.Path, default=shared / "scenes")
-    parser.add_argument("--truth", type=pathlib.Path, default=shared / "truth")
     parser.add_argument("--out", type=pathlib.Path, help="file of the truth")
     parser.add_argument("--samples", type=int, default=0, help="most, a direction")
     parser.add_argument("--error", type=float, default=0.0, help="that is enough")
@@ -381,16 +392,7 @@ def main() -> int:
     parser.add_argument("--altitudes", nargs="*", type=float, default=heights)
     parser.add_argument("--solver", nargs="*", default=[], help="to compare, by name")
     parser.add_argument("--slabs", type=int, default=0, help="rays a flux, if wanted")
-    arguments = parser.parse_args()
-    if arguments.out:
-        truth = Truth(arguments.out)
-        make(truth, arguments)
-        for name in arguments.solver:
-            compare(truth, name, arguments)
-    if arguments.slabs:
-        return 0 if judge(arguments.truth, arguments.slabs) else 1
-    return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main(__doc__, claims, options))

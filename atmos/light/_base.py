@@ -6,6 +6,7 @@ from jaxtyping import Array, Float
 
 from ..quantity import (
     Direction,
+    dot,
     Irradiance,
     Length,
     Number,
@@ -60,7 +61,7 @@ def from_place(
 ) -> Shine:
     """What a place sends to another, by its intensity in W sr^-1 nm^-1."""
     apart = source - position
-    squared = jnp.maximum(jnp.dot(apart, apart), 1e-30)
+    squared = jnp.maximum(dot(apart, apart), 1e-30)
     distance = jnp.sqrt(squared)
     irradiance = jnp.broadcast_to(intensity / squared, wavelength.shape)
     return Shine(apart / distance, distance, irradiance, jnp.zeros_like(distance))

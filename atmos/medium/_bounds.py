@@ -4,7 +4,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..geometry import AbstractPath
-from ..quantity import Length, Number, Position
+from ..quantity import dot, Length, Number, Position
 
 
 def through_box(
@@ -25,10 +25,10 @@ def through_sphere(
 ) -> Float[Array, "2"]:
     """Where a ray enters and leaves a sphere; twice the same if it misses it."""
     to_centre = centre - path.start.position
-    speed = jnp.dot(path.direction, path.direction)
-    middle = jnp.dot(to_centre, path.direction) / speed
+    speed = dot(path.direction, path.direction)
+    middle = dot(to_centre, path.direction) / speed
     aside = to_centre - middle * path.direction
-    squared = (radius * radius - jnp.dot(aside, aside)) / speed
+    squared = (radius * radius - dot(aside, aside)) / speed
     hit = squared > 0.0
     half = jnp.where(hit, jnp.sqrt(jnp.where(hit, squared, 1.0)), 0.0)
     return jnp.stack([middle - half, middle + half])
@@ -39,5 +39,5 @@ def sphere_meets(
 ) -> Number:
     """1 if a sphere and a box have a place in common, 0 otherwise."""
     apart = centre - jnp.clip(centre, lower, upper)
-    meets = jnp.dot(apart, apart) <= radius * radius * (1.0 + 1e-5)
+    meets = dot(apart, apart) <= radius * radius * (1.0 + 1e-5)
     return jnp.where(meets, jnp.ones_like(radius), 0.0)

@@ -3,7 +3,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..geometry import AbstractPath, Point
-from ..quantity import as_float, Length, Number, Position
+from ..quantity import as_float, dot, Length, Number, Position
 from ._base import AbstractLocal, check_above_zero
 from ._bounds import sphere_meets, through_sphere
 
@@ -19,7 +19,7 @@ class Ball(AbstractLocal):
 
     def density(self, point: Point) -> Number:
         apart = point.position - self.centre
-        inside = jnp.dot(apart, apart) <= self.radius * self.radius
+        inside = dot(apart, apart) <= self.radius * self.radius
         return jnp.where(inside, jnp.ones_like(self.radius), 0.0)
 
     def breaks(self, path: AbstractPath) -> Float[Array, "2"]:

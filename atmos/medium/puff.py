@@ -3,7 +3,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..geometry import AbstractPath, Point
-from ..quantity import as_float, Length, Number, Position
+from ..quantity import as_float, dot, Length, Number, Position
 from ._base import AbstractLocal, check_above_zero, check_not_negative
 from ._bounds import sphere_meets, through_sphere
 from ._noise import fractal
@@ -33,7 +33,7 @@ class Puff(AbstractLocal):
 
     def density(self, point: Point) -> Number:
         apart = point.position - self.centre
-        squared = jnp.dot(apart, apart)
+        squared = dot(apart, apart)
         middle = squared <= 0.0
         out = jnp.where(middle, 0.0, jnp.sqrt(jnp.where(middle, 1.0, squared)))
         noise = fractal(point.position / self.size, self.octaves, self.seed)

@@ -5,7 +5,7 @@ from jax.core import Tracer
 from jaxtyping import Array, Float
 
 from ..geometry import AbstractPath, FlatPath, Point
-from ..quantity import as_float, Number, Position
+from ..quantity import as_float, dot, Number, Position
 from ._base import AbstractLocal, AbstractProfile
 
 
@@ -71,8 +71,8 @@ class Transformed(AbstractLocal):
     def _inverse(self, x: Float[Array, "3"]) -> Float[Array, "3"]:
         a, b, c = self.matrix.T
         across = jnp.stack([jnp.cross(b, c), jnp.cross(c, a), jnp.cross(a, b)])
-        return _times(across, x) / jnp.dot(a, across[0])
+        return _times(across, x) / dot(a, across[0])
 
 
 def _times(matrix: Float[Array, "3 3"], x: Float[Array, "3"]) -> Float[Array, "3"]:
-    return jnp.dot(matrix, x, precision="highest")
+    return dot(matrix, x)

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from .. import data
-from ..quantity import Number, Spectral, Wavelength
+from ..quantity import dot, Number, Spectral, Wavelength
 from ..reference import matching_functions
 from ..transport import contract
 from ._fitted import straight
@@ -65,5 +65,5 @@ def locus(temperature: Number) -> tuple[Number, Number]:
 def spectrum(temperature: Number, wavelength: Wavelength) -> Spectral:
     """Daylight of 1 cd m^-2, in W m^-2 sr^-1 nm^-1."""
     mixed = mixture(*locus(temperature))
-    light = jnp.dot(mixed, jnp.asarray(luminances(), mixed.dtype))
+    light = dot(mixed, jnp.asarray(luminances(), mixed.dtype))
     return contract("k,kl->l", mixed / light, components(wavelength))

@@ -17,6 +17,7 @@ from ..quantity import (
     Cosine,
     Depth,
     Direction,
+    dot,
     Number,
     Position,
     Radiance,
@@ -120,7 +121,7 @@ class Hosek(AbstractFittedSky):
         limb = jnp.asarray(sun_tables().limb, self._dtype)
         limb = jnp.matmul(limb.T, self.basis, precision="highest")
         powers = jnp.stack([cosine**k for k in range(6)])
-        shape = jnp.dot(powers, limb, precision="highest")
+        shape = dot(powers, limb)
         return shape * self._along(self._solar(direction[2]))
 
     @property
@@ -128,7 +129,7 @@ class Hosek(AbstractFittedSky):
         return self.wavelength.dtype
 
     def _along(self, values: Float[Array, "channel"]) -> Spectral:
-        return jnp.dot(values, self.basis, precision="highest")
+        return dot(values, self.basis)
 
     def _solar(self, up: Cosine) -> Float[Array, "channel"]:
         """The middle of the disk at its wavelengths, by the elevation of the view."""
@@ -140,4 +141,4 @@ class Hosek(AbstractFittedSky):
         table = jnp.asarray(sun_tables().radiance, self._dtype)
         cubic = between(table, self.turbidity - 1.0)[piece.astype(int)]
         powers = jnp.stack([x**k for k in range(4)])
-        return jnp.maximum(jnp.dot(cubic, powers, precision="highest"), 0.0)
+        return jnp.maximum(dot(cubic, powers), 0.0)

@@ -16,7 +16,7 @@ from jaxtyping import Array, ArrayLike, Float
 
 from .. import data
 from ..light import SOLAR_RADIUS, Sun
-from ..quantity import Angle, as_float, Cosine, deg, Number, Versine, Wavelength
+from ..quantity import Angle, as_float, Cosine, deg, dot, Number, Versine, Wavelength
 from ..spectrum import AbstractSpectrum, Tabulated
 from ._daylight import D65, DAYLIGHT, spectrum, TEMPERATURES
 from ._fitted import AbstractFittedSky, angle_between, hemisphere
@@ -168,8 +168,8 @@ class Perez(AbstractFittedSky):
         log = jnp.log(self.brightness)
         for_sky = jnp.stack([one, self.water, jnp.cos(sun), log])
         for_sun = jnp.stack([one, self.water, across, self.brightness])
-        of_sky = jnp.dot(self._row("sky"), for_sky)
-        of_sun = jnp.maximum(jnp.dot(self._row("sun"), for_sun), 0.0)
+        of_sky = dot(self._row("sky"), for_sky)
+        of_sun = jnp.maximum(dot(self._row("sun"), for_sun), 0.0)
         return direct * of_sun, diffuse * of_sky
 
     @property

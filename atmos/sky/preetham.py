@@ -16,6 +16,7 @@ from ..quantity import (
     deg,
     Depth,
     Direction,
+    dot,
     Fraction,
     Length,
     Number,
@@ -152,7 +153,7 @@ class Preetham(AbstractFittedSky):
     def parts(self, up: Cosine, turned: Versine) -> Float[Array, "part"]:
         luminance, x, y = self.colour(up, turned)
         mixed = mixture(x, y)
-        return luminance * mixed / jnp.dot(mixed, jnp.asarray(luminances(), x.dtype))
+        return luminance * mixed / dot(mixed, jnp.asarray(luminances(), x.dtype))
 
     @property
     def basis(self) -> Float[Array, "part wl"]:

@@ -9,11 +9,11 @@ from jaxtyping import Array, Bool, Float, Integer, PRNGKeyArray
 
 from ..geometry import Point
 from ..light import Sun
-from ..quantity import Direction, Number, Versine, versine, Wavelength
+from ..quantity import Direction, dot, Number, Versine, versine, Wavelength
 from ..scene import Scene
 from ..transport import densities, gauss_legendre
 from . import _directions as directions
-from ._flight import cell, dot, Flight, Layers, NODES, share
+from ._flight import cell, Flight, Layers, NODES, share
 
 
 # The shares of flights to where it is guessed to be bright, and of turns towards where
@@ -176,7 +176,7 @@ def depart(
     """
     up, sun = place.point.up, task.light.direction
     layers = task.layers
-    whence = layers.whence[layers.shell(place.piece), cell(jnp.dot(up, sun))]
+    whence = layers.whence[layers.shell(place.piece), cell(dot(up, sun))]
     count = whence.shape[0]
     where = task.scene, task.wavelength
     apart = turn(*where, place.mixture, hero, u[0], key)
@@ -187,7 +187,7 @@ def depart(
     angle = 2.0 * math.pi * u[2]
     across = jnp.cos(angle) * one + jnp.sin(angle) * other
     turned = cosine * axis + jnp.sqrt(sine) * across
-    turned = turned / jnp.sqrt(jnp.dot(turned, turned))
+    turned = turned / jnp.sqrt(dot(turned, turned))
 
     upto = jnp.cumsum(whence[:, hero])
     chosen = jnp.minimum(jnp.sum(upto <= u[0] * upto[-1]), count - 1)
@@ -199,5 +199,5 @@ def depart(
     turns = phase(*where, place.mixture, versine(along, direction))
     known = whence[directions.sort(direction, up, sun)] * (count * 0.25 / math.pi)
     chance = turns + led * (known - turns)
-    falls = jnp.maximum(jnp.dot(up, direction), 0.0) / math.pi
+    falls = jnp.maximum(dot(up, direction), 0.0) / math.pi
     return direction, jnp.where(place.grounded, falls, chance)

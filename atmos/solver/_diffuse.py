@@ -8,7 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..light import Sun
-from ..quantity import Direction, Irradiance, Number, Position, Wavelength
+from ..quantity import Direction, dot, Irradiance, Number, Position, Wavelength
 from ..scene import Scene
 from ..transport import columns, contract, extinctions
 from ._base import AbstractSolver
@@ -101,7 +101,7 @@ class AbstractDiffuse(AbstractSolver):
     ) -> Fluxes:
         """What crosses a level plane at a place, by one light."""
         point = scene.geometry.locate(position)
-        rise = jnp.maximum(jnp.dot(point.up, light.direction), 0.0)
+        rise = jnp.maximum(dot(point.up, light.direction), 0.0)
         irradiance = light.irradiance.evaluate(wavelength)
         up, down = prepared.field.fluxes(light, point)
         path = scene.geometry.path(point, light.direction)

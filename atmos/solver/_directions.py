@@ -4,7 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, Integer
 
-from ..quantity import Direction
+from ..quantity import Direction, dot
 from ..rotation import basis
 
 
@@ -39,23 +39,23 @@ def draw(
     level = jnp.sqrt(jnp.maximum(1.0 - z * z, 0.0))
     across = jnp.sign(side) * jnp.sin(angle) * aside
     found = z * up + level * (jnp.cos(angle) * ahead + across)
-    return found / jnp.sqrt(jnp.dot(found, found))
+    return found / jnp.sqrt(dot(found, found))
 
 
 def sort(direction: Direction, up: Direction, sun: Direction) -> Integer[Array, ""]:
     """The cell that a direction lies in."""
     ahead, aside = _axes(up, sun)
-    x, y = jnp.dot(direction, ahead), jnp.dot(direction, aside)
+    x, y = dot(direction, ahead), dot(direction, aside)
     angle = jnp.arctan2(jnp.abs(y), x)
-    ring = jnp.int32((0.5 * _RINGS) * (jnp.dot(direction, up) + 1.0))
+    ring = jnp.int32((0.5 * _RINGS) * (dot(direction, up) + 1.0))
     turn = jnp.int32(angle * (_TURNS / jnp.pi))
     return jnp.clip(ring, 0, _RINGS - 1) * _TURNS + jnp.clip(turn, 0, _TURNS - 1)
 
 
 def _axes(up: Direction, sun: Direction) -> tuple[Direction, Direction]:
     """Level towards the sun, and level across."""
-    level = sun - jnp.dot(sun, up) * up
-    squared = jnp.dot(level, level)
+    level = sun - dot(sun, up) * up
+    squared = dot(level, level)
     aside = squared > 1e-10
     level = level / jnp.sqrt(jnp.where(aside, squared, 1.0))
     ahead = jnp.where(aside, level, basis(up)[0])

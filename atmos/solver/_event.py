@@ -16,11 +16,11 @@ from jaxtyping import Array, Float
 
 from ..geometry import FAR
 from ..light import Shine
-from ..quantity import Number
+from ..quantity import dot, Number
 from ..transport import columns
 from ._bend import Bend, falls, turned
 from ._chance import as_key
-from ._flight import dot, LIGHT_NODES
+from ._flight import LIGHT_NODES
 from ._meeting import meet, Meeting
 from ._settled import settled
 from ._trip import Leg, Quest, set_out, Trip

@@ -12,7 +12,7 @@ from jaxtyping import Array, Float, Int
 from ..geometry import Point
 from ..light import Sun
 from ..optics import Mixture
-from ..quantity import Depth, Direction, Wavelength
+from ..quantity import Depth, Direction, dot, Wavelength
 from ..scene import Scene
 from ..transport import contract, cumulative, densities, gauss_legendre
 from ._levels import between
@@ -133,7 +133,7 @@ class Field(AbstractField):
         def near(point):
             zenith = jax.vmap(lambda x: zenith_angle(point.up, x))(towards)
             around = waves(point.up, view, towards, count, self.stokes)
-            basis = travel(-jnp.dot(point.up, view), count, k)
+            basis = travel(-dot(point.up, view), count, k)
             levels, by_level = between(self.altitude, point.altitude)
             return levels, by_level, basis, around, *self.suns.between(light, zenith)
 

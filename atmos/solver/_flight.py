@@ -6,7 +6,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Integer
 
 from ..geometry import AbstractPath, Point
-from ..quantity import Direction, Length
+from ..quantity import Direction, dot, Length
 from ..scene import Scene
 from ..transport import columns, densities, gauss_legendre
 
@@ -111,7 +111,7 @@ def brightness(
     ground = jnp.where(flight.grounded, layers.ground, 0.0)
     even = jnp.exp(-depth) * jnp.concatenate([within, ground[None]])
     places = jnp.append(flight.begin + 0.5 * flight.length, flight.far)
-    cosines = jax.vmap(lambda s: jnp.dot(flight.path.at(s).up, sun))(places)
+    cosines = jax.vmap(lambda s: dot(flight.path.at(s).up, sun))(places)
     pieces = jnp.arange(places.shape[0])
     return even, even * layers.guess[layers.shell(pieces), cell(cosines)]
 
@@ -123,8 +123,3 @@ def to_sun(
     path = scene.geometry.path(point, sun)
     span = path.span(scene.top)
     return columns(scene, path, span.far, nodes=LIGHT_NODES), ~span.grounded
-
-
-def dot(a: Array, b: Array) -> Array:
-    """A matrix product in full precision."""
-    return jnp.dot(a, b, precision="highest")

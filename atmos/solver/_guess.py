@@ -7,11 +7,11 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..geometry import Point
-from ..quantity import Length, Wavelength
+from ..quantity import dot, Length, Wavelength
 from ..scene import Scene
 from ..transport import densities, extinctions
 from ._directions import views as cells
-from ._flight import brightness, dot, fly, Layers, SUNS, to_sun
+from ._flight import brightness, fly, Layers, SUNS, to_sun
 
 
 # Shells besides those of the media.

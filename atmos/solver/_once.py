@@ -8,6 +8,7 @@ from jaxtyping import Array, Float, Int
 from ..geometry import Point
 from ..optics import above, Mixture
 from ..polarisation import vibration
+from ..quantity import dot
 from ..scene import Scene
 from ..transport import contract, gauss_legendre
 from ._harmonics import legendre, second_order
@@ -74,7 +75,7 @@ class Once(eqx.Module):
             q = along * (along + 2.0 * sign * ahead)
             rise = q / (jnp.sqrt(jnp.maximum(radius * radius + q, 0.0)) + radius)
             height = jnp.maximum(altitude + rise, 0.0)
-            turn = jnp.dot(view, sun)
+            turn = dot(view, sun)
             past = self.sunlight.columns(height, radius * rises + along * turn)
             density = jax.vmap(lambda x: above(self.scene, x))(height)
             past += (0.5 * along)[:, None] * (density + here[None])

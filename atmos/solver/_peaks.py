@@ -23,7 +23,7 @@ from jaxtyping import Array, Float
 
 from ..light import Sun
 from ..optics import Mixture, mixture
-from ..quantity import Radiance, Versine, versine, Wavelength
+from ..quantity import dot, Radiance, Versine, versine, Wavelength
 from ..scene import Scene
 from ..transport import (
     columns,
@@ -97,7 +97,7 @@ class Peaks(eqx.Module):
             sunwards = scene.geometry.path(point, light.direction)
             end = sunwards.span(scene.top).far
             found = columns(scene, sunwards, end, nodes=_LIGHT_NODES)
-            return densities(scene, point), found, jnp.dot(point.up, light.direction)
+            return densities(scene, point), found, dot(point.up, light.direction)
 
         # The last of the places is where the line of sight ends.
         found = jax.vmap(ahead)(jnp.append(places.ravel(), far))

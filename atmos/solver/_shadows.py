@@ -13,7 +13,7 @@ from jaxtyping import Array, Float, PyTree
 from ..geometry import Point
 from ..light import Sun
 from ..medium._trilinear import trilinear
-from ..quantity import Position
+from ..quantity import dot, Position
 from ..scene import Scene
 from ..transport import column
 
@@ -100,7 +100,7 @@ class ShadowCache(AbstractShadows):
         bounded, others = _sorted(scene)
         if prepared is None:
             return lambda point: _columns(scene, light, point, others, self.nodes)
-        cosines = jnp.dot(prepared.directions, light.direction, precision="highest")
+        cosines = dot(prepared.directions, light.direction)
         table = prepared.columns[jnp.argmax(cosines)]
         order = np.argsort(np.array([*bounded, *others]))
 

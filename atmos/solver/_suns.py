@@ -9,7 +9,7 @@ from jax.lax import stop_gradient
 from jaxtyping import Array, Float, Int
 
 from ..light import Sun
-from ..quantity import Angle, deg, Direction
+from ..quantity import Angle, deg, Direction, dot
 
 
 class AbstractSuns(eqx.Module):
@@ -134,9 +134,9 @@ def _nearest(lights: Float[Array, "light"], light: Sun) -> Int[Array, ""]:
 
 def zenith_angle(up: Direction, direction: Direction) -> Angle:
     """The angle between a direction and straight up, from 0 to pi."""
-    height = jnp.dot(up, direction)
+    height = dot(up, direction)
     level = direction - height * up
-    squared = jnp.dot(level, level)
+    squared = dot(level, level)
     aside = squared > 0.0
     return jnp.arctan2(
         jnp.where(aside, jnp.sqrt(jnp.where(aside, squared, 1.0)), 0.0), height

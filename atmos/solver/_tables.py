@@ -10,7 +10,7 @@ from jaxtyping import Array, Float
 from ..geometry import Point
 from ..light import Sun
 from ..optics import Mixture
-from ..quantity import Depth, Wavelength
+from ..quantity import Depth, dot, Wavelength
 from ..scene import Scene
 from ..transport import contract
 from ._field import AbstractField
@@ -60,7 +60,7 @@ class Tables(AbstractField):
         del nodes
         eye, view = sight.path.start, sight.path.direction
         horizon = -jnp.sin(scene.geometry.dip(eye.altitude, jnp.zeros_like(sight.far)))
-        cosine = jnp.dot(eye.up, view)
+        cosine = dot(eye.up, view)
         level, x = self._level(eye)
         height = eye.altitude / scene.top
         first, y = self.views.place(cosine, horizon, height, sight.grounded)
@@ -98,10 +98,10 @@ class Tables(AbstractField):
 
     def _turn(self, eye: Point, view, sun):
         """The azimuth between view and sun, among those of the table."""
-        level = view - jnp.dot(view, eye.up) * eye.up
-        ahead = jnp.dot(level, sun)
+        level = view - dot(view, eye.up) * eye.up
+        ahead = dot(level, sun)
         across = jnp.cross(level, sun)
-        aside = jnp.dot(across, eye.up)
+        aside = dot(across, eye.up)
         squared = aside * aside
         some = squared > 1e-16
         aside = jnp.where(some, jnp.sqrt(jnp.where(some, squared, 1.0)), 1e-8)

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..polarisation import frame
-from ..quantity import Direction, Number
+from ..quantity import Direction, dot, Number
 from ..transport import contract
 from ._harmonics import harmonics, pairs, spin_harmonics
 
@@ -84,7 +84,7 @@ def waves(
     forward = jnp.cross(up, right)
 
     def of(sun):
-        aside, ahead = jnp.dot(right, sun), jnp.dot(forward, sun)
+        aside, ahead = dot(right, sun), dot(forward, sun)
         squared = aside * aside + ahead * ahead
         known = squared > float(jnp.finfo(up.dtype).tiny)
         root = jnp.sqrt(jnp.where(known, squared, 1.0))

@@ -8,9 +8,9 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, Integer, PRNGKeyArray
 
 from ..geometry import Point
-from ..quantity import Direction, versine
+from ..quantity import Direction, dot, versine
 from ._collision import depart, land, phase, Task
-from ._flight import brightness, cell, dot, fly, to_sun
+from ._flight import brightness, cell, fly, to_sun
 
 
 # A path is given up by chance where it promises less than this of what is seen, but
@@ -85,7 +85,7 @@ def advance(task: Task, walk: Walk) -> Walk:
     weight, ratio = weigh(walk.weight, walk.ratio, place.seen, place.chance)
 
     turned = versine(walk.direction, sun)
-    falls = jnp.maximum(jnp.dot(here.up, sun), 0.0) / math.pi
+    falls = jnp.maximum(dot(here.up, sun), 0.0) / math.pi
     where = task.scene, task.wavelength
     falls = jnp.where(grounded, falls, phase(*where, place.mixture, turned))
     passed, lit = to_sun(task.scene, here, sun)
@@ -93,7 +93,7 @@ def advance(task: Task, walk: Walk) -> Walk:
     counts = (walk.left > 0) & lit & (walk.order + 1 >= task.first)
     total = walk.total + jnp.where(counts, weight * falls * arrives, 0.0)
 
-    which = jnp.dot(here.up, sun)
+    which = dot(here.up, sun)
     promise = weight * layers.diffuse[layers.shell(place.piece), cell(which)]
     promise = jnp.mean(promise / jnp.maximum(bright, 1e-30))
     stays = jnp.clip(promise / _PROMISE, _LEAST, 1.0)
@@ -101,7 +101,7 @@ def advance(task: Task, walk: Walk) -> Walk:
 
     direction, chance = depart(task, place, walk.direction, hero, order, u[3:], turn)
     turned = phase(*where, place.mixture, versine(walk.direction, direction))
-    falls = jnp.maximum(jnp.dot(here.up, direction), 0.0) / math.pi
+    falls = jnp.maximum(dot(here.up, direction), 0.0) / math.pi
     weight, ratio = weigh(weight, ratio, jnp.where(grounded, falls, turned), chance)
 
     ended = ~jnp.any(weight > 0.0)

@@ -4,6 +4,7 @@ from typing import ClassVar
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+from equinox.internal import nondifferentiable
 from jaxtyping import Array, Float, Integer, PRNGKeyArray, Scalar
 
 from ..light import AbstractLight, Sun
@@ -19,6 +20,12 @@ from ._walk import advance, begin
 from .single_scattering import SingleScattering
 
 
+_NO_SLOPE = (
+    "`PathTracing` has no gradients; `SingleScattering`, `Columns`, `Shells` and, "
+    "forwards, `VolumeTracing` have."
+)
+
+
 class PathTracing(AbstractTracing):
     """Light that turned any number of times, by random paths: right on average.
 
@@ -28,6 +35,9 @@ class PathTracing(AbstractTracing):
     those before: all is decided by `key`. Light that turned once comes from `single`;
     with None it is traced too. Suns are points. Media depend on altitude alone:
     `check` raises `ValueError` otherwise.
+
+    It has no gradients and raises `RuntimeError` where one is asked for: where paths go
+    hangs on the numbers too, by chance, of which there is no slope.
     """
 
     around: ClassVar[int] = 17
@@ -86,6 +96,9 @@ class PathTracing(AbstractTracing):
         assert isinstance(light, Sun), "all else was refused"
         once = 1 if self.single is None else 2
         task = Task(scene, prepared, light, wavelength, once)
+        task, positions, directions = nondifferentiable(
+            (task, positions, directions), msg=_NO_SLOPE
+        )
         # Compiled once, for any number of blocks.
         alike = dataclasses.replace(self, blocks=1, single=None)
         blocks = jnp.int32(self.blocks)

@@ -9,6 +9,7 @@ from ..geometry import AbstractPath, Point
 from ..light import Sun
 from ..quantity import (
     Direction,
+    dot,
     Length,
     Position,
     Radiance,
@@ -138,7 +139,7 @@ class RayMarching(AbstractSolver):
         none = jnp.zeros((0, *wavelength.shape), wavelength.dtype)
         foot = path.at(far)
         foot = Point(foot.position, jnp.zeros_like(far), foot.up)
-        rise = jnp.maximum(jnp.dot(foot.up, light.direction), 0.0)
+        rise = jnp.maximum(dot(foot.up, light.direction), 0.0)
         albedo = scene.ground.evaluate(wavelength)
         ground = albedo / math.pi * rise * arrives(foot) * irradiance
         ray = self._ray(

@@ -8,7 +8,7 @@ from jaxtyping import Array, Bool, Float
 
 from ..geometry import AbstractPath, Point
 from ..light import Sun
-from ..quantity import Direction, Length, Position, Wavelength
+from ..quantity import Direction, dot, Length, Position, Wavelength
 from ..scene import Scene
 from ..transport import (
     columns,
@@ -36,6 +36,11 @@ class SingleScattering(AbstractSolver):
     from there to the sun with `light_nodes`. Where there are more than `pieces`, the
     shortest are joined. With `stokes` 3 the light is polarised; its radiance is the
     same. Raises `ValueError` for other `stokes` than 1 and 3.
+
+    A thin sheet at the far end of a long ray has few of its places. A haze of depth 10,
+    seen from above, is right to 0.1 % where its scale height is 600 m and to 1 % where
+    that is 100 m. One of depth 1000 is right to 0.2 % where it is 1500 m, but off by up
+    to 40 % at 600 m: 30 `nodes` and 16 `light_nodes` make that 0.1 %.
     """
 
     around: ClassVar[int] = 9
@@ -93,7 +98,7 @@ class SingleScattering(AbstractSolver):
             # Where the ray meets the ground it has no digits to lose.
             altitude = jnp.where(last, 0.0, point.altitude)
             point = Point(point.position, altitude, point.up)
-            rise = jnp.dot(point.up, light.direction)
+            rise = dot(point.up, light.direction)
             return densities(scene, point), self._to_light(scene, light, point), rise
 
         every = jnp.append(places.ravel(), far)

@@ -5,7 +5,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from ..medium import check_above_zero
-from ..quantity import as_float, Cosine, Direction, Number, Spectral, Wavelength
+from ..quantity import as_float, Cosine, Direction, dot, Number, Spectral, Wavelength
 from ._base import AbstractMaterial
 
 
@@ -28,7 +28,7 @@ class Glass(AbstractMaterial):
     def turn(
         self, inward: Direction, normal: Direction, u: Float[Array, "3"]
     ) -> Direction:
-        cosine = jnp.dot(inward, normal)
+        cosine = dot(inward, normal)
         enters = cosine < 0.0
         out = jnp.where(enters, normal, -normal)
         cosine = jnp.minimum(jnp.abs(cosine), 1.0)
@@ -40,7 +40,7 @@ class Glass(AbstractMaterial):
         back = inward + 2.0 * cosine * out
         returns = ~passes | (u[0] < _fresnel(cosine, within, ratio))
         found = jnp.where(returns, back, bent)
-        return found / jnp.sqrt(jnp.dot(found, found))
+        return found / jnp.sqrt(dot(found, found))
 
 
 def _fresnel(cosine: Cosine, within: Cosine, ratio: Number) -> Number:

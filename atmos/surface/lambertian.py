@@ -5,7 +5,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..quantity import Direction, Spectral, Wavelength
+from ..quantity import Direction, dot, Spectral, Wavelength
 from ..rotation import around
 from ..spectrum import AbstractSpectrum, as_spectrum
 from ._base import AbstractMaterial
@@ -23,5 +23,5 @@ class Lambertian(AbstractMaterial):
     def turn(
         self, inward: Direction, normal: Direction, u: Float[Array, "3"]
     ) -> Direction:
-        out = jnp.where(jnp.dot(inward, normal) > 0.0, -normal, normal)
+        out = jnp.where(dot(inward, normal) > 0.0, -normal, normal)
         return around(out, 1.0 - jnp.sqrt(u[0]), 2.0 * math.pi * u[1])

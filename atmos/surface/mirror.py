@@ -1,10 +1,9 @@
 from typing import ClassVar
 
 import equinox as eqx
-import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from ..quantity import Direction, Spectral, Wavelength
+from ..quantity import Direction, dot, Spectral, Wavelength
 from ..spectrum import AbstractSpectrum, as_spectrum
 from ._base import AbstractMaterial
 
@@ -21,4 +20,4 @@ class Mirror(AbstractMaterial):
     def turn(
         self, inward: Direction, normal: Direction, u: Float[Array, "3"]
     ) -> Direction:
-        return inward - 2.0 * jnp.dot(inward, normal) * normal
+        return inward - 2.0 * dot(inward, normal) * normal

@@ -3,7 +3,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool
 
 from ..geometry import FAR
-from ..quantity import as_float, Direction, Length, Position
+from ..quantity import as_float, Direction, dot, Length, Position
 from ._base import AbstractShape
 
 
@@ -16,9 +16,9 @@ class Plane(AbstractShape):
     def meet(
         self, start: Position, direction: Direction, leaves: Bool[Array, ""]
     ) -> Length:
-        slope = jnp.dot(self.upright, direction)
+        slope = dot(self.upright, direction)
         level = jnp.abs(slope) < 1e-12
-        height = jnp.dot(self.upright, self.place - start)
+        height = dot(self.upright, self.place - start)
         found = height / jnp.where(level, 1.0, slope)
         return jnp.where(level | leaves | (found <= 0.0), FAR, found)
 

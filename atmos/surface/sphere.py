@@ -4,7 +4,7 @@ from jaxtyping import Array, Bool
 
 from ..geometry import FAR
 from ..medium import check_above_zero
-from ..quantity import as_float, Direction, Length, Position
+from ..quantity import as_float, Direction, dot, Length, Position
 from ._base import AbstractShape
 
 
@@ -21,9 +21,9 @@ class Sphere(AbstractShape):
         self, start: Position, direction: Direction, leaves: Bool[Array, ""]
     ) -> Length:
         ahead = self.centre - start
-        middle = jnp.dot(ahead, direction)
+        middle = dot(ahead, direction)
         aside = ahead - middle * direction
-        squared = self.radius * self.radius - jnp.dot(aside, aside)
+        squared = self.radius * self.radius - dot(aside, aside)
         hit = squared > 0.0
         half = jnp.where(hit, jnp.sqrt(jnp.where(hit, squared, 1.0)), 0.0)
         near, far = middle - half, middle + half
@@ -34,4 +34,4 @@ class Sphere(AbstractShape):
 
     def normal(self, position: Position) -> Direction:
         out = position - self.centre
-        return out / jnp.sqrt(jnp.dot(out, out))
+        return out / jnp.sqrt(dot(out, out))
