@@ -72,10 +72,11 @@ class Tabulated(AbstractSpectrum):
 
     @property
     def domain(self) -> tuple[float, float]:
-        known = np.asarray(self.knots)  # even where others are being traced
-        low = float(known[0]) if self.below is None else 0.0
-        high = float(known[-1]) if self.above is None else math.inf
-        return low, high
+        low, high = ends(self.knots)
+        return (
+            low if self.below is None else 0.0,
+            high if self.above is None else math.inf,
+        )
 
 
 class BandAverage(AbstractSpectrum):
@@ -113,8 +114,8 @@ class BandAverage(AbstractSpectrum):
     @property
     def domain(self) -> tuple[float, float]:
         half = 0.5 * float(self.bandwidth)
-        known = np.asarray(self.knots)
-        return float(known[0]) + half, float(known[-1]) - half
+        low, high = ends(self.knots)
+        return low + half, high - half
 
 
 class Product(AbstractSpectrum):
@@ -164,6 +165,12 @@ def planck(wavelength: Wavelength, temperature: Number) -> Radiance:
 def as_spectrum(x: ArrayLike | AbstractSpectrum) -> AbstractSpectrum:
     """The converter of fields that vary with wavelength: a number is a `Constant`."""
     return x if isinstance(x, AbstractSpectrum) else Constant(x)
+
+
+def ends(knots: Float[Array, "n"]) -> tuple[float, float]:
+    """The first and the last, as plain numbers even while others are traced."""
+    known = np.asarray(knots)
+    return float(known[0]), float(known[-1])
 
 
 def check_table(key: str, knots: Array, name: str, values: Array) -> None:

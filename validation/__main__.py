@@ -218,7 +218,6 @@ def main() -> int:
     arguments.folder.mkdir(parents=True, exist_ok=True)
     usual = [x for x in PARTS if arguments.all or not PARTS[x].long]
     wanted = list(arguments.part or usual)
-
     idle = [x for x in PARTS if x not in wanted]
 
     missing = [x for x in PEERS if importlib.util.find_spec(x) is None]

@@ -183,7 +183,7 @@ def draw_maps(path: pathlib.Path, maps: Sequence) -> None:
         "(below 0.01 % as a number); crossed out: refused"
     )
     few = {"method": Image.Quantize.MEDIANCUT, "colors": 64}
-    figure.savefig(path, dpi=80)
+    figure.savefig(path, dpi=80, bbox_inches="tight", pad_inches=0.1)
     plt.close(figure)
     Image.open(path).convert("RGB").quantize(**few).save(path, optimize=True)
 

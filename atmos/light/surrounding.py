@@ -14,6 +14,7 @@ from ..quantity import (
     Radiance,
     Wavelength,
 )
+from ..spectrum import ends
 from ._base import AbstractLight, Shine
 
 
@@ -67,8 +68,7 @@ class Surrounding(AbstractLight):
         """The wavelengths between which this is known, in nm."""
         if self.knots.size == 1:
             return 0.0, math.inf
-        known = np.asarray(self.knots)
-        return float(known[0]), float(known[-1])
+        return ends(self.knots)
 
     @property
     def backdrop(self) -> bool:

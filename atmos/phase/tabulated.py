@@ -7,7 +7,7 @@ from jax.core import Tracer
 from jaxtyping import Array, ArrayLike, Float, PRNGKeyArray
 
 from ..quantity import as_float, Number, PhaseValue, Versine, Wavelength
-from ..spectrum import check_table
+from ..spectrum import check_table, ends
 from ._base import AbstractPhaseFunction
 
 
@@ -43,8 +43,7 @@ class Tabulated(AbstractPhaseFunction):
         """The wavelengths between which this is known, in nm."""
         if self.wavelength is None:
             return 0.0, math.inf
-        known = np.asarray(self.wavelength)
-        return float(known[0]), float(known[-1])
+        return ends(self.wavelength)
 
     def evaluate(self, versine: Versine, wavelength: Wavelength) -> PhaseValue:
         value = self._normalised(wavelength)

@@ -18,13 +18,13 @@ from ..quantity import (
     Cosine,
     Depth,
     Direction,
-    dot,
     Irradiance,
     km,
     Length,
     Position,
     Radiance,
     Versine,
+    versine,
     Wavelength,
 )
 from ..spectrum import AbstractSpectrum, Constant
@@ -87,8 +87,7 @@ class AbstractFittedSky(AbstractSky):
         _check_place(position)
         up = direction[2]
         towards = Sun.at(self.sun_zenith, self.sun_azimuth, Constant(0.0)).direction
-        apart = direction - towards
-        found = self.parts(jnp.maximum(up, 0.0), 0.5 * dot(apart, apart))
+        found = self.parts(jnp.maximum(up, 0.0), versine(direction, towards))
         sky = contract("p,pl->l", found, self.basis)
         return jnp.where(up >= 0.0, jnp.maximum(sky, 0.0), self.ground_radiance())
 

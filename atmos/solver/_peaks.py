@@ -147,8 +147,10 @@ class Peaks(eqx.Module):
 
         of_sharp = lambda x: jnp.stack([x[..., i] for i in self.sharp], -1)
         event, passed = of_sharp(event), of_sharp(passed)
-        narrow = [jnp.pad(broad[i], ((0, missing), (0, 0))) for i in self.sharp]
-        peak = jnp.stack([fine[i] - x for i, x in zip(self.sharp, narrow, strict=True)])
+        resolved = [jnp.pad(broad[i], ((0, missing), (0, 0))) for i in self.sharp]
+        peak = jnp.stack(
+            [fine[i] - x for i, x in zip(self.sharp, resolved, strict=True)]
+        )
 
         # The moments along the way over that of degree 0, as on average.
         seen = contract("sm,ml->sl", event, peak[:, 0]) * most

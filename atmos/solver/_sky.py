@@ -103,7 +103,7 @@ class SolvedSky(AbstractSky):
             raise ValueError(
                 f"`position` must lie straight above the origin; got {position}."
             )
-        with jax.ensure_compile_time_eval():  # what is known stays so
+        with jax.ensure_compile_time_eval():  # what is not traced stays known
             dip, _ = self._edges(position[2])
             lowest = max((_known(x.zenith + dip) for x in self.scene.suns), default=0.0)
             size = fine_enough(_known(position[2]), lowest, self.solver.around)

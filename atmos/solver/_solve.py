@@ -55,7 +55,7 @@ def admit(
             f"`scene.surfaces` must be empty, for this solver; got "
             f"{len(scene.surfaces)}."
         )
-    with jax.ensure_compile_time_eval():  # what is known stays so
+    with jax.ensure_compile_time_eval():  # what is not traced stays known
         scene = jax.tree.map(lambda x: x.astype(nm.dtype), scene)
     return solver.check(scene, nm), nm
 
