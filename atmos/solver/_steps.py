@@ -9,11 +9,13 @@ import jax.numpy as jnp
 from equinox.internal import while_loop
 from jaxtyping import Array, PRNGKeyArray
 
-from ..quantity import as_float, Length, Number, Radiance
+from ..quantity import as_float, Number, Radiance
 from ._look import of_look
 from ._ray import added, Found, Ray
 
 
+# So many steps are worked on at once.
+_TOGETHER = 16
 # Beyond this optical depth nothing is seen: 2e-9 of what comes from nearer.
 _OPAQUE = 20.0
 # Adaptive steps are no shorter than this share of what lies between two cuts.
@@ -33,14 +35,25 @@ class AbstractSteps(eqx.Module):
         """What is found to the end of the ray."""
 
 
-def _march(ray: Ray, at: Callable[[Array, Length, Length], Length]) -> Found:
-    def step(found, piece):
-        i, begin, end = piece
-        return ray.step(found, begin, end, at(i, begin, end)), None
+def _march(ray: Ray, at: Callable[[Array, Array, Array], Array]) -> Found:
+    count = ray.cuts.shape[0] - 1
+    rounds = -(-count // _TOGETHER)
+    more = jnp.broadcast_to(ray.cuts[-1], rounds * _TOGETHER - count)
+    cuts = jnp.concatenate([ray.cuts, more])
+    begins, ends = (x.reshape(-1, _TOGETHER) for x in (cuts[:-1], cuts[1:]))
+    each = jnp.arange(_TOGETHER, dtype=jnp.int32)
 
-    pieces = jnp.arange(ray.cuts.shape[0] - 1), ray.cuts[:-1], ray.cuts[1:]
-    # A gradient would else keep what was worked out in every step.
-    return jax.lax.scan(jax.checkpoint(step), ray.begin(), pieces)[0]
+    def goes_on(state):
+        i, found = state
+        return (begins[i, 0] < cuts[-1]) & jnp.any(ray.depth(found) < _OPAQUE)
+
+    def step(state):
+        i, found = state
+        places = at(i * _TOGETHER + each, begins[i], ends[i])
+        return i + 1, ray.on(found, begins[i], ends[i], places)
+
+    start = jnp.int32(0), ray.begin()
+    return while_loop(goes_on, step, start, max_steps=rounds, kind="checkpointed")[1]
 
 
 class Fixed(AbstractSteps):
@@ -71,7 +84,11 @@ class Jittered(AbstractSteps):
         key = of_look(self.key, ray.path.start.position, ray.path.direction)
 
         def at(i, begin, end):
-            u = jax.random.uniform(jax.random.fold_in(key, i), (), begin.dtype)
+            u = jax.vmap(
+                lambda i: jax.random.uniform(
+                    jax.random.fold_in(key, i), (), begin.dtype
+                )
+            )(i)
             return begin + u * (end - begin)
 
         return _march(ray, at)
@@ -113,9 +130,8 @@ class Adaptive(AbstractSteps):
             begin, whole = cuts[i], cuts[i + 1] - cuts[i]
             part = jnp.minimum(part, 1.0 - done)
             places = begin + whole * (done + part * jnp.array(_QUARTERS, cuts.dtype))
-            one = ray.step(found, places[0], places[4], places[2])
-            two = ray.step(found, places[0], places[2], places[1])
-            two = ray.step(two, places[2], places[4], places[3])
+            one = ray.on(found, places[:1], places[4:], places[2:3])
+            two = ray.on(found, places[:4:2], places[2::2], places[1::2])
             error = jax.lax.stop_gradient(_difference(ray, found, one, two, bright))
             worst = jnp.max(error / bright, initial=0.0)
             good = (worst <= allowed * part) | (part <= _SHORTEST)
