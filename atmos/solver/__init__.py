@@ -12,6 +12,7 @@ from ._steps import (
     Adaptive as Adaptive,
     Fixed as Fixed,
     Jittered as Jittered,
+    Skipping as Skipping,
 )
 from ._tally import (
     AbstractTracing as AbstractTracing,

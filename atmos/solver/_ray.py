@@ -1,11 +1,12 @@
 """A ray on its way through media: what each step of it passes and sees."""
 
 from collections.abc import Callable
+from typing import Any
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, PyTree
 
 from ..geometry import AbstractPath, Point
 from ..quantity import Depth, Length, Radiance
@@ -34,7 +35,7 @@ class Ray(eqx.Module):
     """A ray, cut where it has to be, and what each metre of it adds.
 
     `source` is what a metre there adds. `behind` is seen
-    at the end, through all of it.
+    at the end, through all of it. `prepared` is what the steps have made ready.
     """
 
     scene: Scene
@@ -44,6 +45,7 @@ class Ray(eqx.Module):
     source: Source
     weights: Float[Array, "part wl"]
     behind: Radiance
+    prepared: PyTree[Any]
 
     def begin(self) -> Found:
         """Nothing yet."""

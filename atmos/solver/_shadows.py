@@ -86,7 +86,7 @@ class ShadowCache(AbstractShadows):
             return _columns(scene, light, point, bounded, self.nodes)
 
         tables = [
-            jax.lax.map(lambda x, light=light: look(light, x), share, batch_size=4096)
+            jax.lax.map(lambda x, light=light: look(light, x), share, batch_size=2**14)
             for light in scene.suns
         ]
         return Cache(
