@@ -136,7 +136,9 @@ def test_the_scenes_own_sun_shines_unless_another_is_asked_for(capsys):
 
 def test_the_optical_depth_of_a_slab_is_its_column_over_the_cosine(capsys, folder):
     # Whatever shines there.
-    glow = THIN.replace("phase =", 'emission = { kind = "constant", value = 1 }\nphase =')
+    glow = THIN.replace(
+        "phase =", 'emission = { kind = "constant", value = 1 }\nphase ='
+    )
     (folder / "bright.toml").write_text(glow + LAMP)
     out, _ = run(
         capsys, "optical-depth bright.toml --altitude 0,250 --view-zenith 0,60,180"
