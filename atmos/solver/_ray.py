@@ -131,7 +131,7 @@ def cut(
     edges = jnp.concatenate(edges)
     others = jnp.clip(others, jnp.min(edges), jnp.max(edges))
     edges = jnp.sort(jnp.concatenate([edges, others]))
-    share = sum(_between(edges, own, upto) for own, upto in shares)
+    share = added(jnp.stack([_between(edges, *x) for x in shares]))
     even = jnp.arange(1, count, dtype=far.dtype) / count * share[-1]
     return _merged(edges, _between(even, share, edges))
 

@@ -13,14 +13,13 @@ from jaxtyping import Array, PRNGKeyArray, PyTree
 from ..quantity import as_float, Number, Radiance, Wavelength
 from ..scene import Scene
 from ._look import of_look
-from ._majorants import Cells, cells_of, cross, fly
 from ._ray import added, Found, Ray
 
 
 # So many steps are worked on at once.
-_TOGETHER = 16
+TOGETHER = 16
 # Beyond this optical depth nothing is seen: 2e-9 of what comes from nearer.
-_OPAQUE = 20.0
+OPAQUE = 20.0
 # Adaptive steps are no shorter than this share of what lies between two cuts.
 _SHORTEST = 2.0**-7
 
@@ -44,19 +43,19 @@ class AbstractSteps(eqx.Module):
 
 def _march(ray: Ray, at: Callable[[Array, Array, Array], Array]) -> Found:
     count = ray.cuts.shape[0] - 1
-    rounds = -(-count // _TOGETHER)
-    more = jnp.broadcast_to(ray.cuts[-1], rounds * _TOGETHER - count)
+    rounds = -(-count // TOGETHER)
+    more = jnp.broadcast_to(ray.cuts[-1], rounds * TOGETHER - count)
     cuts = jnp.concatenate([ray.cuts, more])
-    begins, ends = (x.reshape(-1, _TOGETHER) for x in (cuts[:-1], cuts[1:]))
-    each = jnp.arange(_TOGETHER, dtype=jnp.int32)
+    begins, ends = (x.reshape(-1, TOGETHER) for x in (cuts[:-1], cuts[1:]))
+    each = jnp.arange(TOGETHER, dtype=jnp.int32)
 
     def goes_on(state):
         i, found = state
-        return (begins[i, 0] < cuts[-1]) & jnp.any(ray.depth(found) < _OPAQUE)
+        return (begins[i, 0] < cuts[-1]) & jnp.any(ray.depth(found) < OPAQUE)
 
     def step(state):
         i, found = state
-        places = at(i * _TOGETHER + each, begins[i], ends[i])
+        places = at(i * TOGETHER + each, begins[i], ends[i])
         return i + 1, ray.on(found, begins[i], ends[i], places)
 
     start = jnp.int32(0), ray.begin()
@@ -69,7 +68,7 @@ class Fixed(AbstractSteps):
     count: int = eqx.field(static=True, default=128)
 
     def __check_init__(self):
-        _check_count(self.count)
+        check_count(self.count)
 
     def march(self, ray: Ray) -> Found:
         return _march(ray, lambda i, begin, end: 0.5 * (begin + end))
@@ -85,7 +84,7 @@ class Jittered(AbstractSteps):
     key: PRNGKeyArray = eqx.field(default_factory=lambda: jax.random.key(0))
 
     def __check_init__(self):
-        _check_count(self.count)
+        check_count(self.count)
 
     def march(self, ray: Ray) -> Found:
         key = of_look(self.key, ray.path.start.position, ray.path.direction)
@@ -101,75 +100,6 @@ class Jittered(AbstractSteps):
         return _march(ray, at)
 
 
-class Skipping(AbstractSteps):
-    """Steps of one length, none of them where there is nothing: for clouds and smoke.
-
-    There are `count` on the longest way through the box about all media; where there is
-    nothing is known for so many `cells` along each axis of it. It is as if every step
-    had been taken. Steps heed no edges but those of the box. Raises `ValueError` when
-    solved with a medium that lies in no box.
-    """
-
-    count: int = eqx.field(static=True, default=256)
-    cells: int = eqx.field(static=True, default=32)
-
-    def __check_init__(self):
-        _check_count(self.count)
-        if self.cells < 1:
-            raise ValueError(f"`cells` must be at least 1; got {self.cells}.")
-
-    def prepare(self, scene: Scene, wavelength: Wavelength) -> Cells | None:
-        for i, x in enumerate(scene.media):
-            if x.profile.box is None:
-                raise ValueError(
-                    f"`scene.media[{i}].profile` must lie in a box, for steps that "
-                    f"skip what is empty; got {type(x.profile).__name__}."
-                )
-        if not scene.media:
-            return None
-        return cells_of(scene, wavelength, self.cells, jnp.ones_like(scene.top))
-
-    def march(self, ray: Ray) -> Found:
-        cells = ray.prepared
-        if cells is None:
-            return ray.begin()
-        way = jax.lax.stop_gradient((ray.path.start.position, ray.path.direction))
-        cells, last = jax.lax.stop_gradient((cells, ray.cuts[-1]))
-        first = jnp.minimum(jax.lax.stop_gradient(ray.cuts[0]), last)
-        size = cells.upper - cells.lower
-        length = jnp.sqrt(jnp.sum(size * size)) / self.count
-
-        def onwards(number):
-            """The step in which the next cell begins that holds something."""
-            at = first + number.astype(length.dtype) * length
-            seek = lambda x: fly(cells, x[0], jnp.zeros_like(length))[::3]
-            goes = lambda x: ~x[1] & x[0].inside(cells)
-            start = cross(cells, *way, at, last), jnp.array(False)
-            there, met = jax.lax.while_loop(goes, seek, start)
-            step = jnp.int32(jnp.floor((there.at - first) / length))
-            return jnp.maximum(step, number), met
-
-        def goes_on(state):
-            _, met, found = state
-            return met & jnp.any(ray.depth(found) < _OPAQUE)
-
-        def step(state):
-            number, _, found = state
-            edges = (number + jnp.arange(_TOGETHER + 1, dtype=jnp.int32)).astype(
-                length.dtype
-            )
-            edges = jnp.minimum(first + edges * length, last)
-            begins, ends = edges[:-1], edges[1:]
-            found = ray.on(found, begins, ends, 0.5 * (begins + ends))
-            return *onwards(number + _TOGETHER), found
-
-        start = *onwards(jnp.int32(0)), ray.begin()
-        rounds = -(-self.count // _TOGETHER) + 2
-        return while_loop(goes_on, step, start, max_steps=rounds, kind="checkpointed")[
-            2
-        ]
-
-
 class Adaptive(AbstractSteps):
     """Halves steps until their errors add up to no more than a share `tolerance`.
 
@@ -183,7 +113,7 @@ class Adaptive(AbstractSteps):
     count: int = eqx.field(static=True, default=48)
 
     def __check_init__(self):
-        _check_count(self.count)
+        check_count(self.count)
 
     def march(self, ray: Ray) -> Found:
         bright = ray.radiance(Fixed(self.count).march(ray))
@@ -199,7 +129,7 @@ class Adaptive(AbstractSteps):
         def goes_on(state):
             i, done, _, found = state
             more = cuts[jnp.minimum(i, last)] < cuts[last]
-            return more & jnp.any(ray.depth(found) < _OPAQUE)
+            return more & jnp.any(ray.depth(found) < OPAQUE)
 
         def step(state):
             i, done, part, found = state
@@ -239,6 +169,6 @@ def _difference(
     return own + jnp.minimum(hides, 1.0) * jnp.maximum(bright - seen, 0.0)
 
 
-def _check_count(count: int) -> None:
+def check_count(count: int) -> None:
     if count < 1:
         raise ValueError(f"`count` must be at least 1; got {count}.")
