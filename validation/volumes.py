@@ -2,9 +2,9 @@
 
 The tables are of slabs with the lobes of Henyey and Greenstein: what is reflected and
 transmitted over depth, albedo, asymmetry and sun (DISORT with 128 streams); a slab is a
-box much wider than high here. A z-score is an error in standard errors, which are half a
-percent in the median after five minutes of one core, and 0.2 % (`--looks 24576`) after
-half an hour.
+box much wider than high here. A z-score is an error in standard errors, which are half
+a percent in the median after five minutes of one core, and 0.2 % (`--looks 24576`)
+after half an hour.
 
 Mitsuba's `volpath` (compiled by LLVM where that is installed, as that is its quickest)
 renders the same cloud of 64 cubed cells, lit by one sun, with an albedo of 0.999 and an
