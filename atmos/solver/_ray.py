@@ -127,7 +127,7 @@ def cut(
         shares.append((own, upto / jnp.maximum(upto[-1], 1.0)))
         edges.append(own)
     if not shares:
-        return jnp.clip(others, 0.0, 0.0)
+        return jnp.zeros_like(others, far.dtype)
     edges = jnp.concatenate(edges)
     others = jnp.clip(others, jnp.min(edges), jnp.max(edges))
     edges = jnp.sort(jnp.concatenate([edges, others]))
