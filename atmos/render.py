@@ -1,13 +1,16 @@
 """From a sky to a picture: one radiance per pixel and wavelength, or colour."""
 
 import operator
+import os
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float, Int
+import numpy as np
+from jaxtyping import Array, Float, Int, Integer
 
 from .camera import AbstractCamera
 from .sky import AbstractPanorama, AbstractSky
@@ -16,6 +19,7 @@ from .sky import AbstractPanorama, AbstractSky
 _BLOCK = 2**13  # pixels that are worked on together, so that they stay in the cache
 _STRETCH = 2**20  # pixels between two reports of progress
 _RAYS, _RAY_STRETCH = 2**11, 2**15  # the same where each pixel is a ray of its own
+_TILE = 32  # pixels along an edge of what is looked at together
 # One of each, so that what is compiled for a picture serves the next.
 _RADIANCE, _STOKES = operator.attrgetter("radiance"), operator.attrgetter("stokes")
 
@@ -103,14 +107,26 @@ def _by_rays(
     dtype = sky.wavelength.dtype
     camera = jax.tree.map(lambda x: x.astype(dtype), camera)
     response = None if response is None else response.astype(dtype)
-    count, parts = camera.height * camera.width, []
-    stretch = min(_RAY_STRETCH, -(-count // _RAYS) * _RAYS)
-    for first in range(0, count, stretch):
-        pixels = jnp.arange(stretch, dtype=jnp.int32) + jnp.int32(first)
-        parts.append(_rays(sky, camera, pixels, response, looks))
-        progress(min(1.0, (first + stretch) / count))
-    image = jnp.concatenate(parts)[:count]
+    order = _in_tiles(camera.height, camera.width)
+    stretch = min(_RAY_STRETCH, -(-order.size // _RAYS) * _RAYS)
+    padded = np.pad(order, (0, -order.size % stretch), mode="edge")
+    stretches = jnp.asarray(padded.reshape(-1, stretch))
+    look = lambda pixels: _rays(sky, camera, pixels, response, looks)
+    # The first compiles what the others, on as many cores as there are, use.
+    parts = [look(stretches[0])]
+    progress(1.0 / len(stretches))
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        for part in pool.map(look, stretches[1:]):
+            parts.append(jax.block_until_ready(part))
+            progress(len(parts) / len(stretches))
+    image = jnp.concatenate(parts)[np.argsort(order)]
     return _seen(camera, image.reshape(camera.height, camera.width, *image.shape[1:]))
+
+
+def _in_tiles(height: int, width: int) -> Integer[np.ndarray, "pixel"]:
+    """Pixels in the order of tiles: rays that are worked on together see alike."""
+    y, x = np.indices((height, width), np.int32).reshape(2, -1)
+    return np.lexsort((x, y, x // _TILE, y // _TILE)).astype(np.int32)
 
 
 @eqx.filter_jit

@@ -134,9 +134,14 @@ def test_the_scenes_own_sun_shines_unless_another_is_asked_for(capsys):
     assert [row["view_zenith"] for row in rows(out)] == ["0", "30", "60"]
 
 
-def test_the_optical_depth_of_a_slab_is_its_column_over_the_cosine(capsys):
+def test_the_optical_depth_of_a_slab_is_its_column_over_the_cosine(capsys, folder):
+    # Whatever shines there.
+    glow = THIN.replace(
+        "phase =", 'emission = { kind = "constant", value = 1 }\nphase ='
+    )
+    (folder / "bright.toml").write_text(glow + LAMP)
     out, _ = run(
-        capsys, "optical-depth thin.toml --altitude 0,250 --view-zenith 0,60,180"
+        capsys, "optical-depth bright.toml --altitude 0,250 --view-zenith 0,60,180"
     )
     found = rows(out)
     assert list(found[0]) == ["altitude", "view_zenith", "wavelength", "optical_depth"]

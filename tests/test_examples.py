@@ -76,6 +76,19 @@ def test_the_spot_shines_on_the_ball_through_the_smoke():
     assert 0.3 < values.mean() < 0.7 and values.std() > 0.1
 
 
+def test_the_sun_finds_gaps_in_the_deck_and_shines_between_the_clouds():
+    for name, least, most in (("crepuscular", 0.6, 0.97), ("field", 0.1, 0.4)):
+        text = (EXAMPLES / f"{name}.toml").read_text()
+        coarse = re.sub(r"cells = .*", "cells = [60, 60, 4]", text)
+        cover = np.any(np.asarray(parse(coarse).media[-1].profile.values) > 0.0, 2)
+        assert least < np.mean(cover) < most
+        # The field is seen from above it, the deck from below.
+        above = (
+            parse_camera(coarse).position[2] > parse(coarse).media[-1].profile.upper[2]
+        )
+        assert above == (name == "field")
+
+
 @pytest.mark.parametrize("name", ["cumulus", "fire"])
 def test_scene_files(name):
     text = (EXAMPLES / f"{name}.toml").read_text()

@@ -38,6 +38,7 @@ from atmos.solver import (
     ShadowCache,
     ShadowRays,
     SingleScattering,
+    Skipping,
     solve,
 )
 from atmos.spectrum import planck, PowerLaw
@@ -298,6 +299,23 @@ def cloud(values, size=1.0):
 
 def test_an_empty_grid_is_dark():
     assert np.all(seen(cloud(np.zeros((4, 4, 4))), MARCH, *RAYS) == 0.0)
+
+
+def test_what_is_empty_can_be_skipped():
+    values = np.zeros((4, 4, 4))
+    values[0, 2:, 1:3], values[3, 0, 2] = rng.uniform(0.0, 4.0, (2, 2)), 2.0
+    world = cloud(values)
+    due = seen(world, MARCH, *RAYS)
+    sky = solve(world, RayMarching(Skipping(400, 16), ShadowRays(8)), NM)
+    rays = [jnp.asarray(x) for x in RAYS]
+    full = eqx.tree_at(lambda x: x.prepared[0].bounds, sky, replace_fn=jnp.ones_like)
+    skips, takes = (np.asarray(look(x, *rays)) for x in (sky, full))
+    assert np.min(sky.prepared[0].bounds) < -1.0
+    np.testing.assert_allclose(skips, takes, rtol=1e-12)
+    np.testing.assert_allclose(skips, due, rtol=2e-3, atol=1e-4 * due.max())
+    air = scene(Medium(Exponential(8e3), 1e-5))
+    with pytest.raises(ValueError, match=r"`scene.media\[0\].profile` must lie in a"):
+        solve(air, RayMarching(Skipping()), NM)
 
 
 def test_a_cell_ten_thousand_times_denser_hides_what_is_behind():

@@ -192,7 +192,8 @@ def equations(program):
     "coarse, fine",
     [
         (SingleScattering(nodes=4, pieces=4), SingleScattering(nodes=16, pieces=28)),
-        (RayMarching(Fixed(4)), RayMarching(Fixed(400))),
+        # Both go round more than once, by 16 steps each time.
+        (RayMarching(Fixed(32)), RayMarching(Fixed(400))),
     ],
     ids=["single", "marching"],
 )

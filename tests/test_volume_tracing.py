@@ -7,6 +7,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from hostile import decades, drawn, within
+from hypothesis import given
 
 from atmos.geometry import Flat
 from atmos.light import Sun
@@ -190,6 +192,24 @@ def test_a_ray_meets_as_much_as_lies_in_its_cells():
     np.testing.assert_allclose(reached, 0.5 * depth[:, -1], atol=2e-3)
 
 
+@pytest.mark.parametrize("bound", [0.0, 3.0])
+def test_the_least_and_the_greatest_random_numbers_lead_somewhere(bound):
+    # One cell, 2 m wide, that holds something or not, and a ray out of it; as free
+    # paths are drawn in single precision.
+    least, greatest = np.float32([0.0, 1.0 - 2.0**-24])
+    lower, upper = (jnp.asarray(x, jnp.float32) for x in (LOWER, UPPER))
+    cells = Cells(lower, upper, jnp.full((1, 1, 1), bound, jnp.float32))
+    start, along = jnp.float32([-3.0, 0.0, 2.0]), jnp.float32([1.0, 0.0, 0.0])
+    for far in (50.0, 1e18):
+        ray = cross(cells, start, along, jnp.float32(0.0), jnp.float32(far))
+        assert ray.at == 2.0 and ray.far == 4.0
+        for u, meets in ((least, bound > 0.0), (greatest, False)):
+            found, left, _, met = fly(cells, ray, -jnp.log1p(-u))
+            assert met == meets and found.at == (2.0 if meets else 4.0)
+            assert np.isfinite(left) and (met or not found.inside(cells))
+    assert -np.log1p(-greatest) < 17.0
+
+
 def test_quick_random_numbers_are_even_and_know_nothing_of_each_other():
     key, count = quick(jax.random.key(0)), 2**14
     draw = lambda i: jax.random.uniform(jax.random.fold_in(key, i), (6,), jnp.float32)
@@ -239,6 +259,24 @@ def test_a_grid_and_a_box_look_alike_and_a_peak_aside_changes_nothing():
         cloud(Grid(np.zeros((9, 9, 9)), LOWER, UPPER), 1.0, 0.2, 0.4), START, AIM
     )
     assert np.all(empty[0] == 0.0)
+
+
+@drawn(5)
+@given(
+    decades(1e-6, 10.0, 0.0),
+    decades(1e-6, 1e3, 0.0),
+    within(-0.99, 0.99),
+    within(-1.0, 1.0, 0.0),
+    decades(1e-3, 1e4, 0.0),
+)
+def test_random_clouds_are_bright(scattering, absorption, g, up, peak):
+    """From outside and within, mostly empty or not, under suns however low."""
+    values = np.zeros((9, 9, 9))
+    values[2:4, :, 5], values[8, 0, 0] = 1.0, peak
+    sun = np.array([np.sqrt(1.0 - up * up), 0.0, up])
+    grid = Grid(values, LOWER, UPPER)
+    mean, error = tallied(cloud(grid, scattering, absorption, g, sun), START, AIM)
+    assert np.all(np.isfinite(mean) & (mean >= 0.0) & np.isfinite(error))
 
 
 def test_strong_colours_keep_their_variance():

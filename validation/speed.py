@@ -24,6 +24,8 @@ import atmos
 from atmos import camera, colour, deg, light, render, render_disks, solver
 from atmos.geometry import Flat
 
+from .volumes import MARCH, smoke
+
 
 NM = jnp.linspace(380.0, 780.0, 41)
 
@@ -83,6 +85,19 @@ def solutions():
     yield "Shells: dome from it", *measure(lambda: render(sky, dome)), 0.6
 
 
+def marched():
+    """The same of smoke on a grid of 256 cubed cells, with its shadows, at 1024 x 1024.
+
+    It cannot take less than looking up the smoke and its shadow in the 17 million steps
+    that lie in it, 5 ns each for the eight cells around a place, and exponentials of
+    them: a quarter of a second of one core.
+    """
+    sky, view = smoke(MARCH, 1024)
+    scene, nm = sky.scene, sky.wavelength
+    work = lambda: render(atmos.solve(scene, MARCH, nm), view)
+    yield "smoke, 256 cubed, marched at 1024 x 1024", *measure(work), 2.0
+
+
 def commands():
     """The first `atmos sky` of a machine, and the next, by default and by `single`."""
     for more, later in ([], 8.0), (["--solver", "single"], 7.0):
@@ -120,7 +135,7 @@ def main():
     parser.add_argument("--json", type=pathlib.Path, help="write the figures there")
     parser.add_argument("--no-commands", action="store_true", help="pictures only")
     arguments = parser.parse_args()
-    rows = [*pictures(), *solutions()]
+    rows = [*pictures(), *solutions(), *marched()]
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
     rows += [] if arguments.no_commands else list(commands())
 

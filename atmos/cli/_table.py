@@ -1,5 +1,6 @@
 """`atmos radiance` and `atmos optical-depth`: numbers."""
 
+import dataclasses
 import math
 import sys
 from collections.abc import Iterator, Sequence
@@ -143,7 +144,11 @@ def optical_depth(
     start(float64)
 
     bands = padded(np.array(wavelength, np.float64 if float64 else np.float32))
-    sky = solve_file(load(scene), solver_named("single"), bands, scene)
+    found = load(scene)
+    # What shines has no part in it.
+    dark = [dataclasses.replace(x, emission=None) for x in found.media]
+    found = dataclasses.replace(found, lights=(), media=tuple(dark))
+    sky = solve_file(found, solver_named("single"), bands, scene)
     axes = [np.array(x) for x in (altitude, view_zenith)]
 
     def blocks() -> Iterator[tuple[Sequence[Any], Any]]:

@@ -31,12 +31,17 @@ class Grid(AbstractLocal):
             check_above_zero("upper - lower", size)
 
     def density(self, point: Point) -> Number:
-        x, y, z = (point.position - self.lower) / (self.upper - self.lower)
-        inside = (x >= 0.0) & (x <= 1.0) & (y >= 0.0) & (y <= 1.0)
-        inside = inside & (z >= 0.0) & (z <= 1.0)
-        sizes = zip(self.values.shape, (x, y, z), strict=True)
-        value = trilinear(self.values, *(n * share - 0.5 for n, share in sizes))
-        return jnp.where(inside, value, 0.0)
+        cells = jnp.array(self.values.shape, self.lower.dtype)
+        each = cells / (self.upper - self.lower)
+        inside, places = jnp.array(True), []
+        # One number at a time: XLA on CPUs is slow with vectors of three.
+        for n, x, low, by in zip(
+            self.values.shape, point.position, self.lower, each, strict=True
+        ):
+            place = (x - low) * by
+            inside = inside & (place >= 0.0) & (place <= n)
+            places.append(place - 0.5)
+        return jnp.where(inside, trilinear(self.values, *places), 0.0)
 
     def breaks(self, path: AbstractPath) -> Float[Array, "2"]:
         return through_box(path, self.lower, self.upper)

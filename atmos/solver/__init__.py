@@ -5,6 +5,7 @@ from ._shadows import (
     ShadowCache as ShadowCache,
     ShadowRays as ShadowRays,
 )
+from ._skipping import Skipping as Skipping
 from ._sky import SolvedSky as SolvedSky
 from ._solve import admit as admit, solve as solve
 from ._steps import (

@@ -1,16 +1,19 @@
 """A ray on its way through media: what each step of it passes and sees."""
 
 from collections.abc import Callable
+from typing import Any
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, PyTree
 
 from ..geometry import AbstractPath, Point
 from ..quantity import Depth, Length, Radiance
 from ..scene import Scene
 from ..transport import densities
 from ._flight import share
+from ._settled import settled
 
 
 # Of a place, given by its distance too, and of how much of each medium there is.
@@ -32,7 +35,7 @@ class Ray(eqx.Module):
     """A ray, cut where it has to be, and what each metre of it adds.
 
     `source` is what a metre there adds. `behind` is seen
-    at the end, through all of it.
+    at the end, through all of it. `prepared` is what the steps have made ready.
     """
 
     scene: Scene
@@ -42,21 +45,33 @@ class Ray(eqx.Module):
     source: Source
     weights: Float[Array, "part wl"]
     behind: Radiance
+    prepared: PyTree[Any]
 
     def begin(self) -> Found:
         """Nothing yet."""
         passed = jnp.zeros_like(self.extinction[:, 0])
         return Found(passed, jnp.zeros_like(self.weights), jnp.zeros_like(self.behind))
 
-    def step(self, found: Found, begin: Length, end: Length, at: Length) -> Found:
-        """One step on, as if all of it were like the place `at`."""
-        point = self.path.at(at)
-        here = densities(self.scene, point)
-        length = end - begin
-        depth = total(here * length, self.extinction)
-        seen = jnp.exp(-self.depth(found)) * share(depth) * length
-        light = found.light + self.source(at, point, here) * seen[None]
-        return Found(found.passed + here * length, light, found.error)
+    def on(
+        self,
+        found: Found,
+        begins: Float[Array, "step"],
+        ends: Float[Array, "step"],
+        places: Float[Array, "step"],
+    ) -> Found:
+        """Some steps on, each as if all of it were like one of the places."""
+        points = settled(jax.vmap(self.path.at)(places), self.scene.top[None])
+        here = jax.vmap(lambda point: densities(self.scene, point))(points)
+        here = settled(here, self.scene.top[None])
+        length = (ends - begins)[:, None]
+        amount = here * length
+        before = found.passed[None] + jnp.cumsum(amount, 0) - amount
+        depth, dimmed = (_totals(x, self.extinction) for x in (amount, before))
+        seen = jnp.exp(-dimmed) * share(depth) * length
+        source = jax.vmap(self.source)(places, points, here)
+        source = settled(source, self.scene.top[None])
+        light = found.light + added(source * seen[:, None])
+        return Found(found.passed + added(amount), light, found.error)
 
     def depth(self, found: Found) -> Depth:
         """The optical depth that was passed."""
@@ -79,7 +94,10 @@ def total(
     return added(amount[:, None] * each)
 
 
-def added(rows: Float[Array, "row wl"]) -> Float[Array, "wl"]:
+_totals = jax.vmap(total, in_axes=(0, None))
+
+
+def added(rows: Float[Array, "row *part wl"]) -> Float[Array, "*part wl"]:
     """The sum of some rows, one after the other."""
     found = jnp.zeros_like(rows, shape=rows.shape[1:])
     for row in rows:
@@ -96,9 +114,10 @@ def cut(
 ) -> Float[Array, "cut"]:
     """Cuts a ray where media begin or end, at `others`, and into steps between.
 
-    Each medium takes its share of `count` steps, alike in each of its pieces.
+    From where the first begins to where the last ends. Each medium takes its share of
+    `count` steps, alike in each of its pieces.
     """
-    edges, shares = [jnp.clip(others, 0.0, far)], []
+    edges, shares = [], []
     for x in scene.media:
         own = jnp.clip(x.profile.breaks(path), 0.0, far)
         if x.profile.box is None:
@@ -107,9 +126,39 @@ def cut(
         upto = jnp.concatenate([jnp.zeros_like(own[:1]), jnp.cumsum(alive)])
         shares.append((own, upto / jnp.maximum(upto[-1], 1.0)))
         edges.append(own)
-    edges = jnp.sort(jnp.concatenate(edges))
-    if not shares or edges.shape[0] < 2:
-        return edges
-    share = jnp.sum(jnp.stack([jnp.interp(edges, *x) for x in shares]), 0)
+    if not shares:
+        return jnp.zeros_like(others, far.dtype)
+    edges = jnp.concatenate(edges)
+    others = jnp.clip(others, jnp.min(edges), jnp.max(edges))
+    edges = jnp.sort(jnp.concatenate([edges, others]))
+    share = added(jnp.stack([_between(edges, *x) for x in shares]))
     even = jnp.arange(1, count, dtype=far.dtype) / count * share[-1]
-    return jnp.sort(jnp.concatenate([edges, jnp.interp(even, share, edges)]))
+    return _merged(edges, _between(even, share, edges))
+
+
+def _between(
+    x: Float[Array, "n"], at: Float[Array, "place"], values: Float[Array, "place"]
+) -> Float[Array, "n"]:
+    """Values between places that rise: `jnp.interp`, without a search."""
+    found = jnp.broadcast_to(values[0], x.shape)
+    for i in range(at.shape[0] - 1):
+        width = at[i + 1] - at[i]
+        share = (x - at[i]) / jnp.where(width > 0.0, width, 1.0)
+        beyond = (x > at[i]).astype(x.dtype)
+        share = jnp.where(width > 0.0, jnp.clip(share, 0.0, 1.0), beyond)
+        found = found + share * (values[i + 1] - values[i])
+    return found
+
+
+def _merged(few: Float[Array, "n"], many: Float[Array, "m"]) -> Float[Array, "n+m"]:
+    """Two rising lists as one: one of them shifted by how many of the few precede it.
+
+    Sorting them would take longer than all that is done in the steps between.
+    """
+    ends = jnp.full_like(few, jnp.inf)
+    found = jnp.concatenate([many, ends])
+    for i, x in enumerate(few):
+        shifted = jnp.concatenate([ends[: i + 1], many, ends[i + 1 :]])
+        shifted = shifted.at[: i + 1].set(-jnp.inf)
+        found = jnp.minimum(found, jnp.maximum(x, shifted))
+    return found

@@ -86,7 +86,7 @@ class ShadowCache(AbstractShadows):
             return _columns(scene, light, point, bounded, self.nodes)
 
         tables = [
-            jax.lax.map(lambda x, light=light: look(light, x), share, batch_size=4096)
+            jax.lax.map(lambda x, light=light: look(light, x), share, batch_size=2**14)
             for light in scene.suns
         ]
         return Cache(
@@ -134,15 +134,20 @@ def _look_up(
     light: Sun,
     position: Position,
 ) -> Float[Array, "bounded"]:
-    size = cache.upper - cache.lower
     slope = light.direction
     slope = jnp.where(jnp.abs(slope) < 1e-12, 1e-12, slope)
-    ends = jnp.stack([cache.lower - position, cache.upper - position]) / slope[None]
-    enter, leave = jnp.max(jnp.min(ends, 0)), jnp.min(jnp.max(ends, 0))
-    meets = leave > jnp.maximum(enter, 0.0)
+    cells = jnp.array(table.shape[:3], slope.dtype) - 1.0
+    each, faster = cells / (cache.upper - cache.lower), 1.0 / slope
+    enter, leave = jnp.zeros_like(position[0]), jnp.full_like(position[0], jnp.inf)
+    # One number at a time: XLA on CPUs is slow with vectors of three.
+    for axis in range(3):
+        one, other = (
+            (x[axis] - position[axis]) * faster[axis]
+            for x in (cache.lower, cache.upper)
+        )
+        enter = jnp.maximum(enter, jnp.minimum(one, other))
+        leave = jnp.minimum(leave, jnp.maximum(one, other))
     # From outside, all that counts lies beyond where the ray to the light enters.
-    position = position + jnp.maximum(enter, 0.0) * light.direction
-    shares = zip(table.shape[:3], (position - cache.lower) / size, strict=True)
-    cells = [(n - 1) * share for n, share in shares]
-    found = trilinear(table, *cells)
-    return jnp.where(meets, found, 0.0)
+    position = position + enter * light.direction
+    places = [(position[i] - cache.lower[i]) * each[i] for i in range(3)]
+    return jnp.where(leave > enter, trilinear(table, *places), 0.0)

@@ -2,20 +2,24 @@
 
 import abc
 from collections.abc import Callable
+from typing import Any
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 from equinox.internal import while_loop
-from jaxtyping import Array, PRNGKeyArray
+from jaxtyping import Array, PRNGKeyArray, PyTree
 
-from ..quantity import as_float, Length, Number, Radiance
+from ..quantity import as_float, Number, Radiance, Wavelength
+from ..scene import Scene
 from ._look import of_look
 from ._ray import added, Found, Ray
 
 
+# So many steps are worked on at once.
+TOGETHER = 16
 # Beyond this optical depth nothing is seen: 2e-9 of what comes from nearer.
-_OPAQUE = 20.0
+OPAQUE = 20.0
 # Adaptive steps are no shorter than this share of what lies between two cuts.
 _SHORTEST = 2.0**-7
 
@@ -28,19 +32,34 @@ class AbstractSteps(eqx.Module):
 
     count: eqx.AbstractVar[int]
 
+    def prepare(self, scene: Scene, wavelength: Wavelength) -> PyTree[Any]:
+        """What can be worked out before the first look; None if nothing."""
+        return None
+
     @abc.abstractmethod
     def march(self, ray: Ray) -> Found:
         """What is found to the end of the ray."""
 
 
-def _march(ray: Ray, at: Callable[[Array, Length, Length], Length]) -> Found:
-    def step(found, piece):
-        i, begin, end = piece
-        return ray.step(found, begin, end, at(i, begin, end)), None
+def _march(ray: Ray, at: Callable[[Array, Array, Array], Array]) -> Found:
+    count = ray.cuts.shape[0] - 1
+    rounds = -(-count // TOGETHER)
+    more = jnp.broadcast_to(ray.cuts[-1], rounds * TOGETHER - count)
+    cuts = jnp.concatenate([ray.cuts, more])
+    begins, ends = (x.reshape(-1, TOGETHER) for x in (cuts[:-1], cuts[1:]))
+    each = jnp.arange(TOGETHER, dtype=jnp.int32)
 
-    pieces = jnp.arange(ray.cuts.shape[0] - 1), ray.cuts[:-1], ray.cuts[1:]
-    # A gradient would else keep what was worked out in every step.
-    return jax.lax.scan(jax.checkpoint(step), ray.begin(), pieces)[0]
+    def goes_on(state):
+        i, found = state
+        return (begins[i, 0] < cuts[-1]) & jnp.any(ray.depth(found) < OPAQUE)
+
+    def step(state):
+        i, found = state
+        places = at(i * TOGETHER + each, begins[i], ends[i])
+        return i + 1, ray.on(found, begins[i], ends[i], places)
+
+    start = jnp.int32(0), ray.begin()
+    return while_loop(goes_on, step, start, max_steps=rounds, kind="checkpointed")[1]
 
 
 class Fixed(AbstractSteps):
@@ -49,7 +68,7 @@ class Fixed(AbstractSteps):
     count: int = eqx.field(static=True, default=128)
 
     def __check_init__(self):
-        _check_count(self.count)
+        check_count(self.count)
 
     def march(self, ray: Ray) -> Found:
         return _march(ray, lambda i, begin, end: 0.5 * (begin + end))
@@ -65,13 +84,17 @@ class Jittered(AbstractSteps):
     key: PRNGKeyArray = eqx.field(default_factory=lambda: jax.random.key(0))
 
     def __check_init__(self):
-        _check_count(self.count)
+        check_count(self.count)
 
     def march(self, ray: Ray) -> Found:
         key = of_look(self.key, ray.path.start.position, ray.path.direction)
 
         def at(i, begin, end):
-            u = jax.random.uniform(jax.random.fold_in(key, i), (), begin.dtype)
+            u = jax.vmap(
+                lambda i: jax.random.uniform(
+                    jax.random.fold_in(key, i), (), begin.dtype
+                )
+            )(i)
             return begin + u * (end - begin)
 
         return _march(ray, at)
@@ -90,7 +113,7 @@ class Adaptive(AbstractSteps):
     count: int = eqx.field(static=True, default=48)
 
     def __check_init__(self):
-        _check_count(self.count)
+        check_count(self.count)
 
     def march(self, ray: Ray) -> Found:
         bright = ray.radiance(Fixed(self.count).march(ray))
@@ -106,16 +129,15 @@ class Adaptive(AbstractSteps):
         def goes_on(state):
             i, done, _, found = state
             more = cuts[jnp.minimum(i, last)] < cuts[last]
-            return more & jnp.any(ray.depth(found) < _OPAQUE)
+            return more & jnp.any(ray.depth(found) < OPAQUE)
 
         def step(state):
             i, done, part, found = state
             begin, whole = cuts[i], cuts[i + 1] - cuts[i]
             part = jnp.minimum(part, 1.0 - done)
             places = begin + whole * (done + part * jnp.array(_QUARTERS, cuts.dtype))
-            one = ray.step(found, places[0], places[4], places[2])
-            two = ray.step(found, places[0], places[2], places[1])
-            two = ray.step(two, places[2], places[4], places[3])
+            one = ray.on(found, places[:1], places[4:], places[2:3])
+            two = ray.on(found, places[:4:2], places[2::2], places[1::2])
             error = jax.lax.stop_gradient(_difference(ray, found, one, two, bright))
             worst = jnp.max(error / bright, initial=0.0)
             good = (worst <= allowed * part) | (part <= _SHORTEST)
@@ -147,6 +169,7 @@ def _difference(
     return own + jnp.minimum(hides, 1.0) * jnp.maximum(bright - seen, 0.0)
 
 
-def _check_count(count: int) -> None:
+def check_count(count: int) -> None:
+    """Raises `ValueError` if there is no step."""
     if count < 1:
         raise ValueError(f"`count` must be at least 1; got {count}.")

@@ -39,7 +39,7 @@ class RayMarching(AbstractSolver):
     stokes: int = eqx.field(static=True, init=False, default=1)
 
     def prepare(self, scene: Scene, wavelength: Wavelength) -> PyTree[Any]:
-        return self.shadows.prepare(scene)
+        return self.steps.prepare(scene, wavelength), self.shadows.prepare(scene)
 
     def scattered(
         self,
@@ -95,9 +95,8 @@ class RayMarching(AbstractSolver):
         path, far, _ = enter(scene, position, direction)
         dark = jnp.zeros_like(wavelength)
         none = jnp.zeros_like(far)[None]
-        ray = self._ray(
-            scene, path, far, none, wavelength, source, dark[None] + 1.0, dark
-        )
+        world = prepared, scene, path, far, none, wavelength
+        ray = self._ray(*world, source, dark[None] + 1.0, dark)
         return self.steps.march(ray).light[0]
 
     def _lit(
@@ -115,7 +114,7 @@ class RayMarching(AbstractSolver):
         dark = path.shadow(light.direction, jnp.zeros_like(far))
         turns = [i for i, x in enumerate(scene.media) if x.scattering is not None]
 
-        columns = self.shadows.towards(prepared, scene, light)
+        columns = self.shadows.towards(prepared[1], scene, light)
 
         def arrives(point: Point):
             return jnp.exp(-total(columns(point), extinction))
@@ -143,6 +142,7 @@ class RayMarching(AbstractSolver):
         albedo = scene.ground.evaluate(wavelength)
         ground = albedo / math.pi * rise * arrives(foot) * irradiance
         ray = self._ray(
+            prepared,
             scene,
             path,
             far,
@@ -156,6 +156,7 @@ class RayMarching(AbstractSolver):
 
     def _ray(
         self,
+        prepared: PyTree[Any],
         scene: Scene,
         path: AbstractPath,
         far: Length,
@@ -173,4 +174,5 @@ class RayMarching(AbstractSolver):
             source=source,
             weights=weights,
             behind=behind,
+            prepared=prepared[0],
         )
