@@ -14,7 +14,7 @@ from atmos.medium import Ball, Medium, Uniform
 from atmos.phase import HenyeyGreenstein
 from atmos.quantity import versine
 from atmos.scene import Scene
-from atmos.solver import Columns, SingleScattering, solve
+from atmos.solver import Columns, SingleScattering, solve, SolvedSky
 from atmos.solver._peaks import Peaks
 from atmos.solver._sight import sight
 
@@ -336,6 +336,19 @@ def test_low_suns_in_a_round_world_are_refused():
     for zenith in (86.0, 90.0, 100.0):
         with pytest.raises(ValueError, match="lights.0.. must stand 5 degrees"):
             solve(sinking(zenith), SOLVER, NM)
+
+
+def test_panoramas_beyond_the_line_between_day_and_night_are_refused():
+    """From 400 km the horizon of this planet lies 19.75 degrees of arc away."""
+    zenith = lambda elevation: jnp.cos(jnp.radians(90.0 - elevation))
+    at = jnp.array([0.0, 0.0, 4e5])
+    low, high = (
+        world(Spherical(6.4e6), 0.1, 1.0, 0.0, zenith(x), 0.0, 0.5)
+        for x in (19.7, 19.8)
+    )
+    with pytest.raises(ValueError, match="`position` must be so low .* 0.05 degrees"):
+        SolvedSky(low, SOLVER, jnp.asarray(NM), None).panorama(at)
+    SOLVER.check_panorama(high, high.lights[0].zenith + high.geometry.dip(at[2], 0.0))
 
 
 def test_media_that_change_sideways_are_refused():

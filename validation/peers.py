@@ -66,7 +66,7 @@ def missing() -> list[str]:
 def peers(quick: bool = False) -> Iterator[Peer]:
     """What is installed, at several settings, from the quickest to the finest."""
     if _has("nanodisort"):
-        for n in [8, 16, 32] if quick else [8, 16, 32, 64]:
+        for n in [8, 16] if quick else [8, 16, 32, 64]:
             yield Peer("nanodisort", f"{n} streams", cdisort(n), 89.9, True)
     if _has("PythonicDISORT"):
         for n in [8, 16] if quick else [8, 16, 32]:

@@ -53,6 +53,12 @@ class AbstractSolver(eqx.Module):
         """
         return prepared
 
+    def check_panorama(self, scene: Scene, lowest: float) -> None:
+        """Raises `ValueError` for a place whose horizon the method does not hold for.
+
+        There the lowest light has this zenith angle.
+        """
+
     @abc.abstractmethod
     def scattered(
         self,

@@ -96,8 +96,9 @@ class SolvedSky(AbstractSky):
         """All that one sees from `position`, made ready for millions of looks.
 
         Its zenith angles and azimuths are those at the origin, so the place must lie
-        straight above it: raises `ValueError` otherwise. Where the place, the sun, or
-        the size of the world are traced, it is as fine as any of them might ask for.
+        straight above it: raises `ValueError` otherwise, and from where the solver does
+        not hold for what one sees. Where the place, the sun, or the size of the world
+        are traced, it is as fine as any of them might ask for.
         """
         if not isinstance(position, Tracer) and np.any(np.asarray(position)[:2] != 0.0):
             raise ValueError(
@@ -106,6 +107,8 @@ class SolvedSky(AbstractSky):
         with jax.ensure_compile_time_eval():  # what is not traced stays known
             dip, _ = self._edges(position[2])
             lowest = max((_known(x.zenith + dip) for x in self.scene.suns), default=0.0)
+            if math.isfinite(lowest):
+                self.solver.check_panorama(self.scene, lowest)
             size = fine_enough(_known(position[2]), lowest, self.solver.around)
         return _tabulate(self, position, size)
 

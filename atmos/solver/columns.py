@@ -43,7 +43,8 @@ class Columns(AbstractDiffuse):
     Raises `ValueError` where a medium does not depend on altitude alone, where media
     have more edges than there are layers, in a round world for lights less than 5
     degrees above the horizon, for other `stokes` than 1 and 3, and for 3 with fewer
-    than 4 streams.
+    than 4 streams; and for panoramas from so high up that a light has set on their
+    horizon.
     """
 
     around: ClassVar[int] = 17
@@ -85,6 +86,13 @@ class Columns(AbstractDiffuse):
                     f"{90.0 - float(zenith) / deg:.6g}."
                 )
         return scene
+
+    def check_panorama(self, scene: Scene, lowest: float) -> None:
+        if not isinstance(scene.geometry, Flat) and lowest > 90.001 * deg:
+            raise ValueError(
+                "`position` must be so low that no light has set on the horizon, for "
+                f"columns; there one stands {lowest / deg - 90.0:.3g} degrees below."
+            )
 
     def prepare(self, scene: Scene, wavelength: Wavelength) -> Diffused:
         peaks = Peaks.of(scene, wavelength, self.degrees, self.stokes)
