@@ -265,6 +265,7 @@ def test_twice_the_light_is_twice_as_bright():
     np.testing.assert_allclose(seen(brighter, *angles), 2.0 * seen(FULL, *angles))
 
 
+@pytest.mark.usefixtures("hasty")
 def test_lights_add_up():
     here, view = jnp.zeros(3), jnp.asarray(towards(1.0, 0.5))
     one, other = (Sun(towards(s, a), 1.0, 0.0) for s, a in ((0.5, 0.0), (1.4, 2.0)))
@@ -424,6 +425,7 @@ def test_values_and_gradients_are_finite_at_every_edge(dtype):
             assert np.all(np.isfinite(leaf)), (name, jax.tree_util.keystr(path))
 
 
+@pytest.mark.usefixtures("hasty")
 def test_no_medium_and_one_have_finite_gradients():
     for media in ((), FULL.media[:1]):
         scene = Scene(ROUND, TOP, media, FULL.lights, ALBEDO)
