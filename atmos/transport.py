@@ -111,13 +111,17 @@ def enter(
 ) -> tuple[AbstractPath, Length, Bool[Array, ""]]:
     """The ray from where it enters the air, its length there, and if it ends grounded.
 
-    An observer above the air is moved to its top: no digits are lost on the way.
+    An observer above the air is moved to its top: no digits are lost on the way. A ray
+    that meets no air begins anywhere there.
     """
-    path = scene.geometry.path(scene.geometry.locate(position), direction)
-    path = path.enter(scene.top)
+    along = lambda place: scene.geometry.path(scene.geometry.locate(place), direction)
+    path = along(position).enter(scene.top)
     span = path.span(scene.top)
     # What grazes the top, and by rounding has not entered, is out.
-    return path, jnp.where(span.near > 0.0, 0.0, span.far), span.grounded
+    far = jnp.where(span.near > 0.0, 0.0, span.far)
+    anywhere = along(jnp.zeros_like(position).at[2].set(scene.top))
+    path = jax.tree.map(lambda a, b: jnp.where(far > 0.0, a, b), path, anywhere)
+    return path, far, span.grounded
 
 
 def optical_depth(
