@@ -35,6 +35,7 @@ PARTS = {
     "single_scattering": Part("Light that turned once"),
     "columns": Part("Discrete ordinates in flat columns", True, True),
     "orders": Part("All orders in the round", True),
+    "derivatives": Part("Slopes of radiance", True),
     "multiple_scattering": Part("Path tracing itself", True, True, ("--slabs", "2000")),
     "polarisation": Part("Polarised light", True, True),
     "volumes": Part("Clouds and smoke", True, True),
