@@ -22,6 +22,7 @@ from atmos.image import read_exr
 from atmos.scenefile import dump, load, parse
 
 
+pytestmark = pytest.mark.usefixtures("hasty")
 DEPTH = 1e-6
 THIN = f"""
 [planet]

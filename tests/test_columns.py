@@ -19,6 +19,7 @@ from atmos.solver._peaks import Peaks
 from atmos.solver._sight import sight
 
 
+pytestmark = pytest.mark.usefixtures("hasty")
 NM = np.array([500.0])
 DEEP = 1000.0
 SOLVER = Columns(layers=32)
