@@ -77,16 +77,36 @@ def test_the_spot_shines_on_the_ball_through_the_smoke():
 
 
 def test_the_sun_finds_gaps_in_the_deck_and_shines_between_the_clouds():
-    for name, least, most in (("crepuscular", 0.6, 0.97), ("field", 0.1, 0.4)):
+    for name, least, most in (
+        ("crepuscular", 0.6, 0.97),
+        ("field", 0.1, 0.4),
+        ("orbit", 0.1, 0.5),
+    ):
         text = (EXAMPLES / f"{name}.toml").read_text()
-        coarse = re.sub(r"cells = .*", "cells = [60, 60, 4]", text)
+        # Over 500 km the planet falls away by more than the height of clouds.
+        levels = 20 if name == "orbit" else 4
+        coarse = re.sub(r"cells = .*", f"cells = [60, 60, {levels}]", text)
         cover = np.any(np.asarray(parse(coarse).media[-1].profile.values) > 0.0, 2)
         assert least < np.mean(cover) < most
         # The field is seen from above it, the deck from below.
         above = (
             parse_camera(coarse).position[2] > parse(coarse).media[-1].profile.upper[2]
         )
-        assert above == (name == "field")
+        assert above == (name != "crepuscular")
+
+
+def test_the_edge_of_the_planet_crosses_the_picture_from_orbit():
+    text = re.sub(
+        r"cells = .*", "cells = [1, 1, 1]", (EXAMPLES / "orbit.toml").read_text()
+    )
+    scene, camera = parse(text), parse_camera(text)
+    here = scene.geometry.locate(camera.position)
+    assert np.isclose(here.altitude, 400e3, atol=1e3)
+    middle = 0.5 * camera.width
+    for y, due in ((1.0, False), (camera.height - 1.0, True)):
+        look = camera.direction(jnp.asarray(middle), jnp.asarray(y))
+        path = scene.geometry.path(here, look).enter(scene.top)
+        assert bool(path.span(scene.top).grounded) == due, "space above, sea below"
 
 
 @pytest.mark.parametrize("name", ["cumulus", "fire"])

@@ -41,7 +41,7 @@ def proceed(quest: Quest, trip: Trip) -> Trip:
     """On to the next collision, real or null, to the ground or out."""
     key, own = jax.random.split(jax.random.fold_in(as_key(trip.key), trip.step + 1))
     u = settled(
-        jax.random.uniform(key, (10,), quest.wavelength.dtype), quest.wavelength
+        jax.random.uniform(key, (11,), quest.wavelength.dtype), quest.wavelength
     )
     place = settled(meet(quest, trip, u[:2]), quest.wavelength)
     path = ~trip.beaming & ~trip.ended
@@ -50,27 +50,29 @@ def proceed(quest: Quest, trip: Trip) -> Trip:
     arrives = trip.beaming & place.ends & ~place.leg.blocked
     found += jnp.where(arrives, trip.beam, 0.0)
 
+    shine = settled(_shine(quest, place, u[8:10]), quest.wavelength)
     bend, passed = settled(
-        turned(quest, trip, place, path, u[2:6], own), quest.wavelength
+        turned(quest, trip, place, path, shine, u[2:7], own), quest.wavelength
     )
     weight, ratio = weigh(trip.weight, trip.ratio, passed.seen, passed.chance)
-    shine, beam = settled(
-        _light_up(quest, trip, bend, weight, ratio, u[7:]), quest.wavelength
+    beam = settled(
+        _light_up(quest, trip, bend, shine, weight, ratio, u[10]), quest.wavelength
     )
     beam = jnp.where(bend.turns, beam, _dim(trip, place, u[2]))
     aim = jnp.where(bend.smooth, _SHARP, jnp.mean(ratio * stop_gradient(bend.shares)))
     aim = jnp.where(bend.turns, aim, trip.aim)
-    after = weigh(weight, ratio, bend.shares, stop_gradient(bend.shares))
+    after = weigh(weight, ratio, bend.shares, stop_gradient(bend.chance))
     onwards = lambda a, b: jnp.where(bend.turns, a, b)
     weight, ratio = map(onwards, after, (weight, ratio))
 
     # Given up by chance: what is faint, and what has turned very often.
     order = trip.order + bend.turns.astype(jnp.int32)
-    stays = jnp.clip(jnp.mean(stop_gradient(weight)) / _FAINT, 0.05, 1.0)
+    promise = stop_gradient(jnp.mean(weight) * bend.promise)
+    stays = jnp.clip(promise / _FAINT, 0.05, 1.0)
     often = order > quest.turns
     stays = jnp.where(often, jnp.minimum(stays, 1.0 - 10.0 / quest.turns), stays)
     stays = jnp.where(bend.turns, stays, 1.0)
-    weight = jnp.where(u[6] < stays, weight / stays, 0.0)
+    weight = jnp.where(u[7] < stays, weight / stays, 0.0)
     weight = jnp.where(trip.beaming, trip.weight, weight)
     ratio = jnp.where(trip.beaming, trip.ratio, ratio)
 
@@ -123,21 +125,27 @@ def _seen(quest: Quest, trip: Trip, place: Meeting) -> Float[Array, "wl"]:
     )
 
 
+def _shine(quest: Quest, place: Meeting, u: Float[Array, "2"]) -> Shine:
+    """Where to look for the light from where one has come to."""
+    if quest.light is not None:
+        return quest.light.sample(place.point.position, u, quest.wavelength)
+    far = jnp.full_like(place.leg.at, FAR)
+    dark = jnp.zeros_like(quest.wavelength)
+    return Shine(place.leg.path.direction, far, dark, jnp.zeros_like(far))
+
+
 def _light_up(
     quest: Quest,
     trip: Trip,
     bend: Bend,
+    shine: Shine,
     weight: Float[Array, "wl"],
     ratio: Float[Array, "wl"],
-    u: Float[Array, "3"],
-) -> tuple[Shine, Float[Array, "wl"]]:
-    """Where to look for the light from where a path turns, and what it may add."""
-    nm = quest.wavelength
+    u: Number,
+) -> Float[Array, "wl"]:
+    """What a beam from where a path turns to the light may add."""
     if quest.light is None:
-        far = jnp.full_like(trip.bright, FAR)
-        dark = jnp.zeros_like(nm)
-        return Shine(bend.onward, far, dark, jnp.zeros_like(far)), dark
-    shine = quest.light.sample(bend.point.position, u[:2], nm)
+        return jnp.zeros_like(quest.wavelength)
     share = falls(quest, bend, shine.direction)
     apt = jnp.mean(ratio * stop_gradient(share)) * shine.solid_angle
     beam = weight * share * shine.irradiance / (1.0 + apt)
@@ -146,9 +154,9 @@ def _light_up(
     sent = jnp.clip(stop_gradient(even), _SELDOM, 1.0)
     always = (shine.distance < FAR) | (trip.order == 0)
     sent = jnp.where(always, 1.0, sent)
-    beam = jnp.where(u[2] < sent, beam / sent, 0.0)
+    beam = jnp.where(u < sent, beam / sent, 0.0)
     # What a smooth surface shows is never found on purpose.
-    return shine, jnp.where(bend.smooth, 0.0, beam)
+    return jnp.where(bend.smooth, 0.0, beam)
 
 
 def _dim(trip: Trip, place: Meeting, u: Number) -> Float[Array, "wl"]:
