@@ -120,7 +120,8 @@ def enter(
     # What grazes the top, and by rounding has not entered, is out.
     far = jnp.where(span.near > 0.0, 0.0, span.far)
     anywhere = along(jnp.zeros_like(position).at[2].set(scene.top))
-    path = jax.tree.map(lambda a, b: jnp.where(far > 0.0, a, b), path, anywhere)
+    meets = span.grounded | (far > 0.0)
+    path = jax.tree.map(lambda a, b: jnp.where(meets, a, b), path, anywhere)
     return path, far, span.grounded
 
 

@@ -296,6 +296,14 @@ def test_without_air_the_sky_is_black_and_the_ground_lit():
     np.testing.assert_allclose(glance(views[1]), due[1], rtol=1e-12)
 
 
+def test_who_looks_past_the_air_from_afar_sees_nothing():
+    """However far below the planet the sun stands, in either precision."""
+    grid = np.meshgrid([1e7, 1e8, 1e9], [0.0, 0.1, 2.0], [0.0, 2.0, np.pi])
+    angles = by_angles(grid[0], grid[1], 0.0, grid[2])
+    for dtype in (jnp.float32, jnp.float64):
+        np.testing.assert_array_equal(seen(FULL, *angles, dtype), 0.0)
+
+
 def test_a_thin_medium_is_as_bright_as_there_is_of_it():
     angles = by_angles(0.0, [0.3, 1.0, 1.4], 1.0, [0.2, 1.0, 1.4])
     thin, thinner = (seen(world(ROUND, x, x, x), *angles) for x in (1e-7, 1e-9))

@@ -469,3 +469,12 @@ def test_a_sun_knows_its_angles():
         np.testing.assert_allclose([sun.zenith, sun.azimuth], [zenith, azimuth])
     overhead = Sun.at(0.0, 0.0, EVEN)
     assert overhead.zenith == 0.0 and overhead.azimuth == 0.0
+
+
+def test_who_stands_on_the_ground_sees_it_there():
+    """Not what lies elsewhere, though no air is between."""
+    up = jnp.array([0.6, 0.0, 0.8])
+    position = RADIUS * (up - jnp.array([0.0, 0.0, 1.0]))
+    path, far, grounded = enter(WORLD, position, -up)
+    assert grounded and far == pytest.approx(0.0, abs=1e-6)
+    np.testing.assert_allclose(path.at(far).position, position, atol=1e-6)
