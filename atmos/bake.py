@@ -53,7 +53,7 @@ def load(
     damaged, or serves another sky, and then says what differs; `OSError` where it
     cannot be read; and the errors of `solve`.
     """
-    scene, nm = admit(scene, solver, wavelength)
+    scene, solver, nm = admit(scene, solver, wavelength)
     arrays = archive.read(path, KIND, _made(scene, solver, nm))
 
     # What `prepare` would make of it, without the work.

@@ -76,7 +76,8 @@ def look_up(sky, views, at, slope):
         def one(view):
             line = sight(scene, eye, view, field.mixture.extinction, 4)
             towards = scene, light, light.direction[None], sky.wavelength
-            return field.gather(*towards, line, nodes=0)[0, 0, 0]
+            unknown = jnp.zeros((1, len(scene.media) + 1, sky.wavelength.size))
+            return field.gather(*towards, line, unknown, nodes=0)[0, 0, 0]
 
         return jax.vmap(one)(views)
 

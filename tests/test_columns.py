@@ -1,5 +1,7 @@
 """Light of all orders in flat columns: published slabs, closed forms, and its laws."""
 
+import dataclasses
+
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -9,14 +11,15 @@ from hostile import decades, drawn, within
 from hypothesis import given
 
 from atmos.geometry import Flat, Spherical
-from atmos.light import Sun
+from atmos.light import Sun, sunlight
 from atmos.medium import Ball, Medium, Uniform
 from atmos.phase import HenyeyGreenstein
-from atmos.quantity import versine
-from atmos.scene import Scene
+from atmos.quantity import deg, versine
+from atmos.scene import earth, Scene
 from atmos.solver import Columns, SingleScattering, solve, SolvedSky
 from atmos.solver._peaks import Peaks
 from atmos.solver._sight import sight
+from atmos.spectrum import Constant, Tabulated
 
 
 pytestmark = pytest.mark.usefixtures("hasty")
@@ -322,6 +325,90 @@ def test_a_huge_planet_is_flat():
 
     flat = looks(numbers, VIEWS, SOLVER)[1]
     np.testing.assert_allclose(seen(numbers), flat, rtol=1e-4)
+
+
+MANY = np.linspace(380.0, 780.0, 41)
+COARSE = Columns(streams=4, layers=16, suns=5, pieces=6)
+
+
+def hazy(ground, zenith=60 * deg, ozone=300.0):
+    """Clear air over ground whose albedo may be as rough as one likes."""
+    sun = Sun.at(zenith, 0.0, sunlight())
+    return earth(sun, ozone_column=ozone, ground=ground)
+
+
+@eqx.filter_jit
+def spectra(scene, solver):
+    """Radiances from the ground and from space, and fluxes at the ground."""
+    sky = solve(scene, solver, MANY)
+    views = jnp.asarray(towards(np.array([1.0, 0.1, -0.4]), np.array([0.3, 1.0, 2.0])))
+    places = jnp.array([[0.0, 0.0, 2.0], [0.0, 0.0, 4e5]])
+    look = sky.prepared, sky.scene, sky.scene.suns[0], sky.wavelength
+    fluxes = sky.solver.fluxes(*look, places[0])
+    seen = jax.vmap(jax.vmap(sky.radiance, (None, 0)), (0, None))(places, views)
+    seen = seen.reshape(-1, MANY.size)
+    return jnp.concatenate([seen, jnp.stack([fluxes.up, fluxes.diffuse])])
+
+
+@pytest.mark.parametrize("zenith", [30.0, 75.0])
+@pytest.mark.parametrize("rough", [False, True])
+def test_few_wavelengths_tell_the_rest(zenith, rough):
+    albedo = 0.3 + 0.3 * np.sin(np.arange(MANY.size) ** 2.0) * rough
+    scene = hazy(Tabulated(MANY, albedo), zenith * deg)
+    few, every = (
+        spectra(scene, dataclasses.replace(COARSE, wavelengths=n)) for n in (10, 41)
+    )
+    lit = every > 1e-6 * np.max(every)
+    error = np.abs(few / np.where(lit, every, 1.0) - 1.0)[lit]
+    assert np.max(error) < 3e-3
+    assert np.mean(error) < 2e-4
+
+
+def test_few_polarised_wavelengths_tell_the_rest():
+    scene = hazy(Constant(0.2))
+
+    @eqx.filter_jit
+    def stokes(n):
+        solver = dataclasses.replace(COARSE, wavelengths=n, stokes=3)
+        sky = solve(scene, solver, MANY)
+        views = towards(np.array([0.9, 0.3]), np.array([0.8, 1.6]))
+        return jax.vmap(sky.stokes, (None, 0))(jnp.array([0.0, 0.0, 2.0]), views)
+
+    few, every = stokes(10), stokes(41)
+    assert np.max(np.abs(few - every) / every[:, :1]) < 2e-3
+    assert np.max(np.abs(few - every)) > 0.0
+
+
+def test_few_wavelengths_are_chosen_where_the_air_is_smooth():
+    suited = lambda scene, nm: Columns().suited(scene, jnp.asarray(nm)).wavelengths
+    smooth, ground = hazy(Constant(0.2)), Constant(0.2)
+    assert suited(smooth, MANY) == 10
+    assert suited(smooth, MANY[:9]) >= 9
+    # Ozone is rough below 330 nm, and so is a gas with lines.
+    assert suited(smooth, np.linspace(300.0, 780.0, 49)) == 49
+    lines = Medium(Uniform(0.0, 1e3), absorption=Tabulated(MANY, MANY % 20.0 * 1e-5))
+    striped = dataclasses.replace(smooth, media=(*smooth.media, lines))
+    assert suited(striped, MANY) == 41
+    # Where numbers are traced, nothing is left out.
+    lengths = []
+
+    @jax.jit
+    def traced(ozone):
+        sky = solve(hazy(ground, ozone=ozone), COARSE, MANY)
+        lengths.append(sky.prepared.field.field.up.shape[-1])
+        return ozone
+
+    traced(300.0)
+    assert lengths == [41]
+
+
+def test_wavelengths_that_do_not_lie_apart_are_refused():
+    scene, same = hazy(Constant(0.2)), np.full(20, 500.0)
+    assert Columns().suited(scene, jnp.asarray(same)).wavelengths == 20
+    with pytest.raises(ValueError, match="`wavelengths` must be no more than lie"):
+        solve(scene, Columns(wavelengths=8), same)
+    with pytest.raises(ValueError, match="`wavelengths` must be at least 5; got 4"):
+        Columns(wavelengths=4)
 
 
 def test_more_edges_than_layers_are_refused():

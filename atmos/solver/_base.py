@@ -35,6 +35,10 @@ class AbstractSolver(eqx.Module):
         """
         return scene
 
+    def suited(self, scene: Scene, wavelength: Wavelength) -> "AbstractSolver":
+        """This solver, with what it leaves open settled to suit a scene."""
+        return self
+
     def baked(self, scene: Scene) -> Scene:
         """All of a scene that `prepare` is told: less than the whole if that will do.
 

@@ -83,13 +83,14 @@ class AbstractDiffuse(AbstractSolver):
             lit = scene, fewer.extinction, stands, wavelength
             found = self.single.march(*lit, *look)
             if peaks is None:
-                return found
-            return found.at[-1].add(peaks.scattered(scene, stands, wavelength, line))
+                return found, jnp.zeros_like(wavelength)
+            return found, peaks.scattered(scene, stands, wavelength, line)
 
-        found = jax.vmap(once)(towards)
-        more = field.gather(scene, light, towards, wavelength, line, nodes=self.nodes)
-        found = found.at[:, -1].add(more[:, 0])
-        return jnp.concatenate([found, more[:, 1:]], 1)
+        found, more = jax.vmap(once)(towards)
+        known = scene, light, towards, wavelength, line, found
+        again = field.gather(*known, nodes=self.nodes)
+        found = found.at[:, -1].add(more + again[:, 0])
+        return jnp.concatenate([found, again[:, 1:]], 1)
 
     def fluxes(
         self,
@@ -103,7 +104,7 @@ class AbstractDiffuse(AbstractSolver):
         point = scene.geometry.locate(position)
         rise = jnp.maximum(dot(point.up, light.direction), 0.0)
         irradiance = light.irradiance.evaluate(wavelength)
-        up, down = prepared.field.fluxes(light, point)
+        up, down = prepared.field.fluxes(scene, light, point)
         path = scene.geometry.path(point, light.direction)
         found = columns(scene, path, path.span(scene.top).far, nodes=16)
         passed = lambda x: rise * jnp.exp(-contract("m,ml->l", found, x))

@@ -25,6 +25,19 @@ from ._towards import Travel, travel, turned, waves
 _FEW, _MORE = 12, 36
 
 
+class Ground(eqx.Module):
+    """Diffuse light of nothing but ground that shines evenly, with radiance 1.
+
+    Its moments and fluxes are those of a `Field` without a sun. The ground receives
+    `lit` of each sun where it is black, directly and through the air.
+    """
+
+    moments: Float[Array, "level pair wl"]
+    up: Float[Array, "level wl"]
+    down: Float[Array, "level wl"]
+    lit: Float[Array, "sun wl"]
+
+
 class AbstractField(eqx.Module):
     """Light that turned more than once, or that is about to, as solvers find it.
 
@@ -35,7 +48,7 @@ class AbstractField(eqx.Module):
     mixture: eqx.AbstractVar[Mixture]
 
     @abc.abstractmethod
-    def fluxes(self, light: Sun, point: Point) -> tuple[Depth, Depth]:
+    def fluxes(self, scene: Scene, light: Sun, point: Point) -> tuple[Depth, Depth]:
         """Diffuse flux upwards and downwards, for a light of irradiance 1."""
 
     @abc.abstractmethod
@@ -46,20 +59,40 @@ class AbstractField(eqx.Module):
         towards: Float[Array, "light 3"],
         wavelength: Wavelength,
         sight: Sight,
+        once: Float[Array, "light part wl"],
         *,
         nodes: int,
     ) -> Float[Array, "light stokes wl"]:
         """Light of more than one turn from along a line of sight, and from its end.
 
-        Of a light that stands in one of several directions.
+        Of a light that stands in one of several directions, of which light that turned
+        `once` is known.
         """
+
+    def sent_down(
+        self,
+        scene: Scene,
+        light: Sun,
+        towards: Float[Array, "light 3"],
+        sight: Sight,
+    ) -> Float[Array, "light wl"]:
+        """The diffuse flux on the ground where a line of sight ends."""
+        foot = sight.path.at(sight.far)
+        foot = Point(foot.position, jnp.zeros_like(sight.far), foot.up)
+
+        def of(towards):
+            stands = dataclasses.replace(light, direction=towards)
+            return self.fluxes(scene, stands, foot)[1]
+
+        return jax.vmap(of)(towards)
 
 
 class Field(AbstractField):
     """The moments of diffuse light over altitude, from the ground up, and suns.
 
     Of a light of irradiance 1, relative to the exponential of `reference`; `moments` as
-    of `_ordinates.Diffuse`. With `stokes` 3 it is I, Q and U that one sees.
+    of `_ordinates.Diffuse`. With `stokes` 3 it is I, Q and U that one sees. What the
+    ground adds is part of it, or is told apart as `ground`, over black ground then.
     """
 
     mixture: Mixture
@@ -70,8 +103,10 @@ class Field(AbstractField):
     down: Float[Array, "level sun wl"]
     reference: Float[Array, "level sun"]
     stokes: int = eqx.field(static=True, default=1)
+    ground: Ground | None = None
 
-    def fluxes(self, light: Sun, point: Point) -> tuple[Depth, Depth]:
+    def fluxes(self, scene: Scene, light: Sun, point: Point) -> tuple[Depth, Depth]:
+        del scene
         first, by_sun = self.suns.between(
             light, zenith_angle(point.up, light.direction)
         )
@@ -88,9 +123,31 @@ class Field(AbstractField):
         towards: Float[Array, "light 3"],
         wavelength: Wavelength,
         sight: Sight,
+        once: Float[Array, "light part wl"],
         *,
         nodes: int,
     ) -> Float[Array, "light stokes wl"]:
+        del once
+        seen, column = self.along(scene, light, towards, sight, nodes)
+        depth = contract("m,ml->l", column, self.mixture.extinction)
+        albedo = scene.ground.evaluate(wavelength) * jnp.exp(-depth)
+        down = self.sent_down(scene, light, towards, sight)
+        ground = albedo[None] / math.pi * down
+        seen = seen.at[:, 0].add(jnp.where(sight.grounded, ground, 0.0))
+        return seen * light.irradiance.evaluate(wavelength)[None, None]
+
+    def along(
+        self,
+        scene: Scene,
+        light: Sun,
+        towards: Float[Array, "light 3"],
+        sight: Sight,
+        nodes: int,
+    ) -> tuple[Float[Array, "light part wl"], Float[Array, "medium"]]:
+        """Light of irradiance 1 from along a line, without its end; and its columns.
+
+        Where there is ground apart, what it adds to I, or I, Q and U, follows them.
+        """
         # The line's vertical plane is the same everywhere, so that Q and U simply add.
         path, length = sight.path, sight.length
         u, w = (jnp.asarray(x, length.dtype) for x in gauss_legendre(nodes))
@@ -111,14 +168,7 @@ class Field(AbstractField):
         share = share * (length[:, None] * arrives)[:, None]
         source = self._sources(light, towards, points, density, path.direction)
         seen = contract("pjl,pjasl->asl", share, source)
-
-        foot = path.at(sight.far)
-        foot = Point(foot.position, jnp.zeros_like(sight.far), foot.up)
-        stands = lambda x: self.fluxes(dataclasses.replace(light, direction=x), foot)[1]
-        albedo = scene.ground.evaluate(wavelength) * jnp.exp(-jnp.sum(depth, 0))
-        ground = albedo[None] / math.pi * jax.vmap(stands)(towards)
-        seen = seen.at[:, 0].add(jnp.where(sight.grounded, ground, 0.0))
-        return seen * light.irradiance.evaluate(wavelength)[None, None]
+        return seen, contract("j,pjm->m", w, amount)
 
     def _sources(
         self,
@@ -127,7 +177,7 @@ class Field(AbstractField):
         points: Point,
         density: Float[Array, "piece node medium"],
         view: Direction,
-    ) -> Float[Array, "piece node light stokes wl"]:
+    ) -> Float[Array, "piece node light part wl"]:
         """What a metre adds, at places along a ray, to the light that arrives."""
 
         def near(point):
@@ -167,7 +217,7 @@ class Field(AbstractField):
         around: Float[Array, "light stokes m"],
         start: Int[Array, ""],
         by_sun: Float[Array, "light near"],
-    ) -> Float[Array, "light stokes wl"]:
+    ) -> Float[Array, "light part wl"]:
         """The same at one place, with weights of the suns from one on."""
         _, rows, suns, wl = self.moments.shape
         width = by_sun.shape[1]
@@ -181,11 +231,20 @@ class Field(AbstractField):
         near = jax.lax.dynamic_slice_in_dim(self.reference, start, width, 1)
         reference = contract("i,is->s", by_level, near[levels])
         bright = by_sun * jnp.exp(contract("as,s->a", by_sun, reference))[:, None]
+        if self.ground is not None:
+            glow = contract("i,irl->rl", by_level, self.ground.moments[levels])
+            mixed = jnp.concatenate([mixed, glow], 1)
         add = lambda x: contract("m,m...->...", density, x)
         scattering, polarised = self.mixture.scattering, self.mixture.polarised
         seen = turned(add(scattering), add(polarised), basis, mixed, self.stokes)
-        seen = seen.reshape(self.stokes, -1, width, wl)
-        return contract("asm,ak,smkl->asl", around, bright, seen)
+        seen = seen.reshape(self.stokes, -1, mixed.shape[1] // wl, wl)
+        found = contract("asm,ak,smkl->asl", around, bright, seen[:, :, :width])
+        if self.ground is None:
+            return found
+        lit = jax.lax.dynamic_slice_in_dim(self.ground.lit, start, width, 0)
+        lit = contract("ak,kl->al", bright, lit)
+        glow = contract("asm,sml->asl", around, seen[:, :, width]) * lit[:, None]
+        return jnp.concatenate([found, glow], 1)
 
 
 def _spread(

@@ -30,8 +30,9 @@ from ._layer import identity, inverse_of, product, respond, START
 
 
 class Diffuse(eqx.Module):
-    """Diffuse light at levels, top first, for a beam of irradiance 1 across it.
+    """Diffuse light at levels, top first, for beams of irradiance 1 across them.
 
+    The last of the suns is none: it is ground that shines evenly, with radiance 1.
     `moments` are integrals over all directions of travel of the radiance times
     `harmonics`, in the order of `pairs`: the T of `_harmonics`. Where there is
     polarisation, the moments E of all pairs of degrees that it has follow, and then B.
@@ -48,12 +49,11 @@ def solve_column(
     scattering: Float[Array, "layer l wl"],
     slant: Float[Array, "level sun wl"],
     cosine: Float[Array, "sun"],
-    albedo: Float[Array, "wl"],
     polarised: Float[Array, "layer k 3 wl"],
     *,
     nodes: int,
 ) -> Diffuse:
-    """The diffuse light in layers, top first, over a Lambertian ground.
+    """The diffuse light in layers, top first, over black ground, and from the ground.
 
     `scattering` is the depth of scattering times the moments of the phase function, no
     more than twice the ordinates to either side, `nodes`. `polarised` is that times the
@@ -63,7 +63,11 @@ def solve_column(
     """
     count, k = scattering.shape[1], polarised.shape[1]
     matrix = [scattering, *(polarised[:, :, i] for i in range(3))]
-    solve = lambda made, known: _solve(made, depth, known, slant, cosine, albedo)
+    # In place of one more sun, from which nothing arrives, the ground shines.
+    none = jnp.full_like(slant[:, :1], math.inf)
+    slant = jnp.concatenate([slant, none], 1)
+    cosine = jnp.concatenate([cosine, jnp.zeros_like(cosine[:1])])
+    solve = lambda made, known: _solve(made, depth, known, slant, cosine)
     # Orders of azimuth that polarisation has no part in are solved without it.
     parts = []
     if k:
@@ -82,7 +86,7 @@ def solve_column(
 
 
 def _solve(
-    made: Basis, depth: Array, scattering: Array, slant: Array, cosine: Array, albedo
+    made: Basis, depth: Array, scattering: Array, slant: Array, cosine: Array
 ) -> tuple[Array, Array, Array]:
     """Moments [level, sun, m, term, wl] of some orders of azimuth; fluxes of order 0.
 
@@ -103,7 +107,8 @@ def _solve(
     lit = beam * constant(sides), beam * constant(~sides)
     into = lambda a, b: jnp.einsum("...l,lw->...w", a, b, precision="highest")
 
-    fall = jnp.diff(slant, axis=0)
+    fall = jnp.diff(slant[:, :-1], axis=0)
+    fall = jnp.concatenate([fall, jnp.zeros_like(slant[1:, :1])], 1)
     doublings = _doublings(depth / float(made.cosine[0]), fall)
     small = jnp.exp2(-doublings.astype(depth.dtype))
 
@@ -128,12 +133,10 @@ def _solve(
         below = product(on, s) + start
         return below, (below, product(stack, below) + light)
 
-    # Of intensities alone: the ground sends no polarised light back.
+    # Of intensities alone: what the ground sends is not polarised.
     intensity = np.arange(len(scale)) < made.nodes
     c = constant(np.where(intensity, np.sqrt(made.weight * made.cosine), 0.0))
-    first = constant(made.orders == 0)
-    arrives = jnp.maximum(cosine, 0.0)[:, None] * jnp.exp(-slant[-1])
-    ground = _ground(c, first, albedo[None, None, None], arrives)
+    ground = _ground(c, constant(made.orders == 0), jnp.zeros_like(slant[0]))
     (stack, light), layers = jax.lax.scan(
         up, ground, (depth, scattering, slant[:-1], fall), reverse=True
     )
@@ -163,16 +166,15 @@ def _doublings(steepest: Array, fall: Array) -> Array:
     return found.astype(jnp.int32)
 
 
-def _ground(
-    c: Array, first: Array, albedo: Array, arrives: Array
-) -> tuple[Array, Array]:
-    """G and g of a Lambertian ground, on which a beam of flux `arrives` falls.
+def _ground(c: Array, first: Array, none: Array) -> tuple[Array, Array]:
+    """G and g of ground that returns nothing, and that shines in place of the last sun.
 
-    With c the root of weight times cosine, the squares of which sum to 1/2: light that
-    goes down as v comes up as 2 albedo c (c v).
+    With c the root of weight times cosine: of a radiance of 1 that is c, upwards alone,
+    so that the sum is s = c + v of what comes down and the difference d = 2 c - s.
     """
-    share = albedo / (1.0 + albedo)
-    bounce = (c[:, None] * c[None])[:, :, None, None] * first[:, None][None, None]
-    black = jnp.eye(len(c), dtype=c.dtype)[:, :, None, None]
-    glow = c[:, None, None, None] * first[:, None][None, None] * arrives[None, :, None]
-    return 4.0 * share * bounce - black, 2.0 / math.pi * share * glow
+    shape = len(c), len(first), none.shape[-1]
+    black = -jnp.eye(len(c), dtype=c.dtype)[:, :, None, None]
+    shines = jnp.ones_like(none).at[:-1].set(0.0)
+    glow = first[None, None, :, None] * shines[None, :, None]
+    glow = 2.0 * c[:, None, None, None] * glow
+    return jnp.broadcast_to(black, (len(c), *shape)), glow

@@ -21,15 +21,15 @@ def solve(scene: Scene, solver: AbstractSolver, wavelength: ArrayLike) -> Solved
     wavelengths are one-dimensional, lie between 100 nm and 100 um, and every table of
     the scene covers them; and for a scene that the solver does not hold for.
     """
-    scene, nm = admit(scene, solver, wavelength)
+    scene, solver, nm = admit(scene, solver, wavelength)
     prepared = solver.found(_prepare(solver, solver.baked(scene), nm))
     return SolvedSky(scene=scene, solver=solver, wavelength=nm, prepared=prepared)
 
 
 def admit(
     scene: Scene, solver: AbstractSolver, wavelength: ArrayLike
-) -> tuple[Scene, Wavelength]:
-    """A scene and wavelengths as a solver is told them, or the errors of `solve`."""
+) -> tuple[Scene, AbstractSolver, Wavelength]:
+    """A scene, a solver that suits it, and wavelengths, or the errors of `solve`."""
     nm = as_float(wavelength)
     if nm.ndim != 1:
         raise ValueError(f"`wavelength` must be one-dimensional; got shape {nm.shape}.")
@@ -57,7 +57,8 @@ def admit(
         )
     with jax.ensure_compile_time_eval():  # what is not traced stays known
         scene = jax.tree.map(lambda x: x.astype(nm.dtype), scene)
-    return solver.check(scene, nm), nm
+    scene = solver.check(scene, nm)
+    return scene, solver.suited(scene, nm), nm
 
 
 @eqx.filter_jit

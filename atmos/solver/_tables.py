@@ -35,7 +35,8 @@ class Tables(AbstractField):
     down: Float[Array, "level sun wl"]
     views: Views = eqx.field(static=True)
 
-    def fluxes(self, light: Sun, point: Point) -> tuple[Depth, Depth]:
+    def fluxes(self, scene: Scene, light: Sun, point: Point) -> tuple[Depth, Depth]:
+        del scene
         level, x = self._level(point)
         sun, y = self._sun(zenith_angle(point.up, light.direction))
         weight = jnp.multiply.outer(jnp.stack([1.0 - x, x]), jnp.stack([1.0 - y, y]))
@@ -54,10 +55,11 @@ class Tables(AbstractField):
         towards: Float[Array, "light 3"],
         wavelength: Wavelength,
         sight: Sight,
+        once: Float[Array, "light part wl"],
         *,
         nodes: int,
     ) -> Float[Array, "light 1 wl"]:
-        del nodes
+        del once, nodes
         eye, view = sight.path.start, sight.path.direction
         horizon = -jnp.sin(scene.geometry.dip(eye.altitude, jnp.zeros_like(sight.far)))
         cosine = dot(eye.up, view)

@@ -1,3 +1,5 @@
+import dataclasses
+import math
 from typing import ClassVar
 
 import equinox as eqx
@@ -7,13 +9,14 @@ from jax.core import Tracer
 from jaxtyping import Array, Bool, Float
 
 from ..geometry import Flat
-from ..optics import check_layered, layers
-from ..quantity import Angle, deg, Length, Wavelength
+from ..optics import check_layered, layers, mixture
+from ..quantity import Angle, deg, Length, Number, Wavelength
 from ..scene import Scene
-from ..transport import columns
+from ..transport import columns, contract
 from ._base import check_stokes
 from ._diffuse import AbstractDiffuse, Diffused
-from ._field import Field
+from ._field import Field, Ground
+from ._interpolated import Chosen, Interpolated, misfit
 from ._ordinates import solve_column
 from ._peaks import Peaks
 from ._suns import FlatSuns, RoundSuns
@@ -23,6 +26,9 @@ from .single_scattering import SingleScattering
 # The largest zenith angle of a light. The error of flat columns, 0.5 % by day and 0.9 %
 # on average at 80 degrees, is 15 % at 88.
 _LOWEST = 85.001 * deg
+# So many wavelengths do where all optical depths are so close to what is drawn through
+# them: radiances are then within 1e-3 or so.
+_FEW, _SMOOTH = 10, 0.01
 # Of light that meets so much more on its way into the shadow nothing is left there.
 _SHADE, _NIGHT = 16.0, 1e3
 
@@ -43,14 +49,15 @@ class Columns(AbstractDiffuse):
     Raises `ValueError` where a medium does not depend on altitude alone, where media
     have more edges than there are layers, in a round world for lights less than 5
     degrees above the horizon, for other `stokes` than 1 and 3, and for 3 with fewer
-    than 4 streams; and for panoramas from so high up that a light has set on their
-    horizon.
+    than 4 streams, for fewer than 5 `wavelengths` or for more than lie apart from each
+    other; and for panoramas from so high up that a light has set on their horizon.
     """
 
     around: ClassVar[int] = 17
     streams: int = eqx.field(static=True, default=16)
     layers: int = eqx.field(static=True, default=60)
     suns: int = eqx.field(static=True, default=12)
+    wavelengths: int | None = eqx.field(static=True, default=None)
     pieces: int = eqx.field(static=True, default=12)
     nodes: int = eqx.field(static=True, default=3)
     single: SingleScattering = SingleScattering()
@@ -58,6 +65,10 @@ class Columns(AbstractDiffuse):
 
     def __check_init__(self):
         check_stokes(self.stokes)
+        if self.wavelengths is not None and self.wavelengths < 5:
+            raise ValueError(
+                f"`wavelengths` must be at least 5; got {self.wavelengths}."
+            )
         if self.stokes == 3 and self.streams < 4:
             raise ValueError(
                 f"`streams` must be at least 4 where `stokes` is 3; got {self.streams}."
@@ -94,9 +105,29 @@ class Columns(AbstractDiffuse):
                 f"columns; there one stands {lowest / deg - 90.0:.3g} degrees below."
             )
 
+    def suited(self, scene: Scene, wavelength: Wavelength) -> "Columns":
+        count, known = wavelength.size, jax.tree.leaves((scene, wavelength))
+        few = _FEW if self.wavelengths is None else self.wavelengths
+        if count <= few:
+            return dataclasses.replace(self, wavelengths=few)
+        if any(isinstance(x, Tracer) for x in known):
+            few = count if self.wavelengths is None else few
+            return dataclasses.replace(self, wavelengths=few)
+        rough = float(_roughness(scene, wavelength, few))
+        if self.wavelengths is None:
+            few = few if rough < _SMOOTH else count
+        elif math.isinf(rough):
+            raise ValueError(
+                "`wavelengths` must be no more than lie apart from each other; "
+                f"got {few}."
+            )
+        return dataclasses.replace(self, wavelengths=few)
+
     def prepare(self, scene: Scene, wavelength: Wavelength) -> Diffused:
         peaks = Peaks.of(scene, wavelength, self.degrees, self.stokes)
         mixed = peaks.without
+        chosen = Chosen.of(wavelength, self.wavelengths or _FEW)
+        few = jax.tree.map(lambda x: x[..., chosen.index], mixed)
         cut = layers(scene, mixed.extinction, self.layers)
         lights = jnp.array([x.zenith for x in scene.suns], wavelength.dtype)
         last = 0.5 * jnp.pi + scene.geometry.dip(scene.top, jnp.zeros_like(scene.top))
@@ -105,33 +136,55 @@ class Columns(AbstractDiffuse):
         zeniths = suns.zeniths()
         at = jax.vmap(_towards, (None, 0, None))
         found, dark = jax.vmap(at, (None, None, 0), 1)(scene, cut.altitude, zeniths)
-        slant = jnp.einsum("ksm,ml->ksl", found, mixed.extinction, precision="highest")
+        slant = jnp.einsum("ksm,ml->ksl", found, few.extinction, precision="highest")
         slant = _shaded(slant, dark[:, :, None])
-        total = lambda x: jnp.einsum(
-            "km,m...->k...", cut.column, x, precision="highest"
+        total = lambda x: contract("km,m...->k...", cut.column, x)
+        cosine = jnp.cos(zeniths)
+        # Levels from the ground up, as fields have them.
+        light = jax.tree.map(
+            lambda x: x[::-1],
+            solve_column(
+                total(few.extinction)[::-1],
+                total(few.scattering)[::-1],
+                slant[::-1],
+                cosine,
+                total(few.polarised)[::-1],
+                nodes=self.streams // 2,
+            ),
         )
-        albedo = jnp.broadcast_to(scene.ground.evaluate(wavelength), wavelength.shape)
-        light = solve_column(
-            total(mixed.extinction)[::-1],
-            total(mixed.scattering)[::-1],
-            slant[::-1],
-            jnp.cos(zeniths),
-            albedo,
-            total(mixed.polarised)[::-1],
-            nodes=self.streams // 2,
+        moments = jnp.swapaxes(light.moments, 1, 2)
+        direct = jnp.maximum(cosine, 0.0)[:, None] * jnp.exp(-slant[0])
+        ground = Ground(
+            moments[:, :, -1],
+            light.up[:, -1],
+            light.down[:, -1],
+            direct + light.down[0, :-1],
         )
-        turned = lambda x: x[::-1]
         field = Field(
-            mixed,
+            few,
             cut.altitude,
             suns,
-            jnp.swapaxes(turned(light.moments), 1, 2),
-            turned(light.up),
-            turned(light.down),
+            moments[:, :, :-1],
+            light.up[:, :-1],
+            light.down[:, :-1],
             jnp.zeros((len(cut.altitude), len(zeniths)), wavelength.dtype),
             self.stokes,
+            ground,
         )
+        albedo = jnp.broadcast_to(scene.ground.evaluate(wavelength), wavelength.shape)
+        field = Interpolated(mixed, chosen, field, albedo)
         return Diffused(field, peaks, jnp.zeros((), wavelength.dtype))
+
+
+@eqx.filter_jit
+def _roughness(scene: Scene, wavelength: Wavelength, few: int) -> Number:
+    """By how much few wavelengths miss what a medium takes out, scatters or turns."""
+    zero = jnp.zeros(3, wavelength.dtype)
+    path = scene.geometry.path(scene.geometry.locate(zero), zero.at[2].set(1.0))
+    found = columns(scene, path, scene.top, nodes=6)
+    mixed = mixture(scene, wavelength, 2)
+    depths = jnp.concatenate([mixed.extinction[:, None], mixed.scattering], 1)
+    return misfit(found[:, None, None] * depths, wavelength, few)
 
 
 def _towards(

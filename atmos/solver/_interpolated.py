@@ -1,0 +1,181 @@
+"""Diffuse light at few wavelengths, drawn out to all that are asked for.
+
+Relative to light that turned once, diffuse light over black ground is so smooth in
+wavelength that a few are enough. The albedo of ground need not be smooth: what the
+ground adds is found for ground that shines evenly, and then is exact for any albedo.
+"""
+
+import math
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float, Int
+
+from ..geometry import Point
+from ..light import Sun
+from ..optics import Mixture
+from ..quantity import Depth, Number, Wavelength
+from ..scene import Scene
+from ..transport import columns, contract
+from ._field import AbstractField, Field, Ground
+from ._levels import between
+from ._sight import Sight
+from ._suns import zenith_angle
+
+
+# The rational function through the chosen joins polynomials of this degree.
+_DEGREE = 4
+
+
+class Chosen(eqx.Module):
+    """Some of all wavelengths, and what they weigh in a smooth function at all."""
+
+    index: Int[Array, "few"]
+    weights: Float[Array, "few wl"]
+
+    @classmethod
+    def of(cls, wavelength: Wavelength, count: int) -> "Chosen":
+        """All, or so many from the shortest to the longest, crowded at both ends.
+
+        Between these, which must lie apart from each other, lies the rational function
+        of Floater and Hormann (2007, "Barycentric rational interpolation with no
+        poles", Numerische Mathematik 107).
+        """
+        size = wavelength.size
+        if size <= count:
+            every = jnp.arange(size, dtype=jnp.int32)
+            return cls(every, jnp.eye(size, dtype=wavelength.dtype))
+        t = np.linspace(0.0, 1.0, count)
+        t = 0.5 * t + 0.25 - 0.25 * np.cos(math.pi * t)
+        x = jax.lax.stop_gradient(wavelength)
+        low, t = jnp.min(x), jnp.asarray(t, x.dtype)
+        wanted = low + (jnp.max(x) - low) * t
+        index = jnp.argmin(jnp.abs(x[None] - wanted[:, None]), 1).astype(jnp.int32)
+        nodes = x[index]
+        scale = (nodes[-1] - nodes[0]) / count
+        apart = (nodes[:, None] - nodes[None]) / scale
+        apart = jnp.abs(apart) + jnp.eye(count, dtype=x.dtype)
+        # Windows of neighbours, a polynomial through each.
+        first = np.arange(count - _DEGREE)[:, None]
+        within = (np.arange(count) >= first) & (np.arange(count) <= first + _DEGREE)
+        within = jnp.asarray(within, x.dtype)
+        share = jnp.exp(-contract("ij,kj->ik", within, jnp.log(apart)))
+        sign = jnp.asarray((-1.0) ** np.arange(count), x.dtype)
+        share = sign * jnp.sum(within * share, 0)
+        here = nodes[:, None] == x[None]
+        away = jnp.where(here, 1.0, (x[None] - nodes[:, None]) / scale)
+        share = share[:, None] / away
+        share = share / jnp.sum(share, 0, keepdims=True)
+        met = jnp.any(here, 0, keepdims=True)
+        return cls(index, jnp.where(met, jnp.asarray(here, x.dtype), share))
+
+    @property
+    def whole(self) -> bool:
+        """Whether all are chosen."""
+        return self.weights.shape[0] == self.weights.shape[1]
+
+    def smooth(self, known: Float[Array, "*n few"]) -> Float[Array, "*n wl"]:
+        """At all wavelengths, what is known at some."""
+        return known if self.whole else contract("...k,kl->...l", known, self.weights)
+
+    def like(
+        self, known: Float[Array, "*n few"], guide: Float[Array, "*n wl"]
+    ) -> Float[Array, "*n wl"]:
+        """The same of what is never negative, and of a kind with a guide."""
+        if self.whole:
+            return known
+        least = float(jnp.finfo(known.dtype).tiny) ** 0.5
+        guide = guide + least
+        ratio = jnp.log((jnp.maximum(known, 0.0) + least) / guide[..., self.index])
+        return guide * jnp.exp(self.smooth(ratio))
+
+
+def misfit(depth: Float[Array, "*n wl"], wavelength: Wavelength, count: int) -> Number:
+    """By how much optical depths differ at most from what is drawn through a few.
+
+    Infinite where these do not lie apart from each other.
+    """
+    chosen = Chosen.of(wavelength, count)
+    drawn = chosen.smooth(depth[..., chosen.index])
+    apart = jnp.all(jnp.diff(wavelength[chosen.index]) > 0.0)
+    most = jnp.max(jnp.abs(drawn - depth), initial=0.0)
+    return jnp.where(apart, most, math.inf)
+
+
+class Interpolated(AbstractField):
+    """A field at some wavelengths, over ground apart; everything else at all."""
+
+    mixture: Mixture
+    chosen: Chosen
+    field: Field
+    albedo: Float[Array, "wl"]
+
+    @property
+    def _ground(self) -> Ground:
+        assert self.field.ground is not None
+        return self.field.ground
+
+    def _returned(self) -> Float[Array, "wl"]:
+        """The radiance of ground over what it would receive if it were black."""
+        # Of its light, what does not come down again.
+        lost = 1.0 - self._ground.down[0] / math.pi
+        if not self.chosen.whole:
+            lost = jnp.exp(self.chosen.smooth(jnp.log(lost)))
+        return self.albedo / (1.0 - self.albedo + self.albedo * lost) / math.pi
+
+    def fluxes(self, scene: Scene, light: Sun, point: Point) -> tuple[Depth, Depth]:
+        zenith = zenith_angle(point.up, light.direction)
+        first, by_sun = self.field.suns.between(light, zenith)
+        suns = first + jnp.arange(len(by_sun), dtype=jnp.int32)
+        lit = contract("j,jl->l", by_sun, self._ground.lit[suns])
+        levels, by_level = between(self.field.altitude, point.altitude)
+        glow = lambda x: lit * contract("i,il->l", by_level, x[levels])
+        black = self.field.fluxes(scene, light, point)
+        # Diffuse light is alike to that which comes straight.
+        path = scene.geometry.path(point, light.direction)
+        column = columns(scene, path, path.span(scene.top).far, nodes=8)
+        guide = jnp.exp(-contract("m,ml->l", column, self.mixture.extinction))
+        up, down = (
+            self.chosen.like(x, guide)
+            + self._returned() * self.chosen.like(glow(y), guide)
+            for x, y in zip(black, (self._ground.up, self._ground.down), strict=True)
+        )
+        return up, down
+
+    def gather(
+        self,
+        scene: Scene,
+        light: Sun,
+        towards: Float[Array, "light 3"],
+        wavelength: Wavelength,
+        sight: Sight,
+        once: Float[Array, "light part wl"],
+        *,
+        nodes: int,
+    ) -> Float[Array, "light stokes wl"]:
+        found, column = self.field.along(scene, light, towards, sight, nodes)
+        irradiance = light.irradiance.evaluate(wavelength)
+        irradiance = jnp.broadcast_to(irradiance, wavelength.shape)
+        found = found * irradiance[self.chosen.index][None, None]
+        guide = jnp.sum(once[:, :-1], 1)
+        black, glow = (self._drawn(x, guide) for x in jnp.split(found, 2, 1))
+        seen = black + glow * self._returned()[None, None]
+
+        down = self.sent_down(scene, light, towards, sight)
+        depth = contract("m,ml->l", column, self.mixture.extinction)
+        ground = self.albedo / math.pi * jnp.exp(-depth) * irradiance
+        ground = down * ground[None]
+        return seen.at[:, 0].add(jnp.where(sight.grounded, ground, 0.0))
+
+    def _drawn(
+        self, found: Float[Array, "light stokes few"], guide: Float[Array, "light wl"]
+    ) -> Float[Array, "light stokes wl"]:
+        """I like its guide; Q and U relative to I."""
+        if self.chosen.whole:
+            return found
+        intensity = self.chosen.like(found[:, 0], guide)[:, None]
+        some = found[:, :1] > 0.0
+        share = jnp.where(some, found[:, 1:] / jnp.where(some, found[:, :1], 1.0), 0.0)
+        return jnp.concatenate([intensity, intensity * self.chosen.smooth(share)], 1)
