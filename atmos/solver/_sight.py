@@ -13,8 +13,10 @@ from ..scene import Scene
 from ..transport import contract, densities, enter, gauss_legendre
 
 
-# Where to cut a ray: fractions of its length in which depth is summed up coarsely.
-_COARSE = np.concatenate([[0.0], 2.0 ** np.linspace(-20.0, 0.0, 33)])
+# Where to cut a ray: fractions of its length in which depth is summed up coarsely. From
+# above it is the far end that counts, where the air is thick.
+_NEAR, _FAR = 2.0 ** np.linspace(-20.0, -1.0, 23), 2.0 ** np.linspace(-2.0, -10.0, 10)
+_COARSE = np.concatenate([[0.0], _NEAR, 1.0 - _FAR, [1.0]])
 
 
 class Sight(eqx.Module):
