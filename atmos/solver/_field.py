@@ -28,14 +28,14 @@ _FEW, _MORE = 12, 36
 class Ground(eqx.Module):
     """Diffuse light of nothing but ground that shines evenly, with radiance 1.
 
-    Its moments and fluxes are those of a `Field` without a sun. The ground receives
-    `lit` of each sun where it is black, directly and through the air.
+    With moments like those of a `Field`. Of each sun it receives `sky` from the air,
+    where it is black, and `lit` in all; of its own light it receives `back`.
     """
 
     moments: Float[Array, "level pair wl"]
-    up: Float[Array, "level wl"]
-    down: Float[Array, "level wl"]
+    sky: Float[Array, "sun wl"]
     lit: Float[Array, "sun wl"]
+    back: Float[Array, "wl"]
 
 
 class AbstractField(eqx.Module):
@@ -69,6 +69,10 @@ class AbstractField(eqx.Module):
         `once` is known.
         """
 
+    def received(self, scene: Scene, light: Sun, foot: Point) -> Depth:
+        """The diffuse flux on ground that one sees, for a light of irradiance 1."""
+        return self.fluxes(scene, light, foot)[1]
+
     def sent_down(
         self,
         scene: Scene,
@@ -76,13 +80,13 @@ class AbstractField(eqx.Module):
         towards: Float[Array, "light 3"],
         sight: Sight,
     ) -> Float[Array, "light wl"]:
-        """The diffuse flux on the ground where a line of sight ends."""
+        """The same where a line of sight ends, of a light in several directions."""
         foot = sight.path.at(sight.far)
         foot = Point(foot.position, jnp.zeros_like(sight.far), foot.up)
 
         def of(towards):
             stands = dataclasses.replace(light, direction=towards)
-            return self.fluxes(scene, stands, foot)[1]
+            return self.received(scene, stands, foot)
 
         return jax.vmap(of)(towards)
 
@@ -91,8 +95,7 @@ class Field(AbstractField):
     """The moments of diffuse light over altitude, from the ground up, and suns.
 
     Of a light of irradiance 1, relative to the exponential of `reference`; `moments` as
-    of `_ordinates.Diffuse`. With `stokes` 3 it is I, Q and U that one sees. What the
-    ground adds is part of it, or is told apart as `ground`, over black ground then.
+    of `_ordinates.Diffuse`. With `stokes` 3 it is I, Q and U that one sees.
     """
 
     mixture: Mixture
@@ -103,7 +106,6 @@ class Field(AbstractField):
     down: Float[Array, "level sun wl"]
     reference: Float[Array, "level sun"]
     stokes: int = eqx.field(static=True, default=1)
-    ground: Ground | None = None
 
     def fluxes(self, scene: Scene, light: Sun, point: Point) -> tuple[Depth, Depth]:
         del scene
@@ -143,10 +145,12 @@ class Field(AbstractField):
         towards: Float[Array, "light 3"],
         sight: Sight,
         nodes: int,
+        ground: Ground | None = None,
     ) -> tuple[Float[Array, "light part wl"], Float[Array, "medium"]]:
         """Light of irradiance 1 from along a line, without its end; and its columns.
 
-        Where there is ground apart, what it adds to I, or I, Q and U, follows them.
+        Where there is ground apart, what it adds to I, or I, Q and U, if it sends back
+        as a radiance what it receives while it is black, follows them.
         """
         # The line's vertical plane is the same everywhere, so that Q and U simply add.
         path, length = sight.path, sight.length
@@ -166,7 +170,7 @@ class Field(AbstractField):
         whole = jnp.where(empty, 1.0, -jnp.expm1(-depth) / jnp.where(empty, 1.0, even))
         arrives = whole * jnp.exp(depth - jnp.cumsum(depth, 0))
         share = share * (length[:, None] * arrives)[:, None]
-        source = self._sources(light, towards, points, density, path.direction)
+        source = self._sources(light, towards, points, density, path.direction, ground)
         seen = contract("pjl,pjasl->asl", share, source)
         return seen, contract("j,pjm->m", w, amount)
 
@@ -177,6 +181,7 @@ class Field(AbstractField):
         points: Point,
         density: Float[Array, "piece node medium"],
         view: Direction,
+        ground: Ground | None,
     ) -> Float[Array, "piece node light part wl"]:
         """What a metre adds, at places along a ray, to the light that arrives."""
 
@@ -196,7 +201,8 @@ class Field(AbstractField):
             spread = jax.vmap(jax.vmap(lambda i, by: _spread(i, by, width)))
             weights = spread(first - start[..., None], by_sun)
             # Its gradient finds what was mixed anew: kept, it would fill the memory.
-            of_place = jax.checkpoint(lambda *x: self._source(*x), prevent_cse=False)
+            mixed = lambda *x: self._source(ground, *x)
+            of_place = jax.checkpoint(mixed, prevent_cse=False)
             of_piece = lambda x: jax.vmap(of_place)(*x)
             places = density, *known, start, weights
             return lambda: jax.lax.map(of_piece, places)
@@ -210,6 +216,7 @@ class Field(AbstractField):
 
     def _source(
         self,
+        ground: Ground | None,
         density: Float[Array, "medium"],
         levels: Int[Array, "4"],
         by_level: Float[Array, "4"],
@@ -231,17 +238,17 @@ class Field(AbstractField):
         near = jax.lax.dynamic_slice_in_dim(self.reference, start, width, 1)
         reference = contract("i,is->s", by_level, near[levels])
         bright = by_sun * jnp.exp(contract("as,s->a", by_sun, reference))[:, None]
-        if self.ground is not None:
-            glow = contract("i,irl->rl", by_level, self.ground.moments[levels])
+        if ground is not None:
+            glow = contract("i,irl->rl", by_level, ground.moments[levels])
             mixed = jnp.concatenate([mixed, glow], 1)
         add = lambda x: contract("m,m...->...", density, x)
         scattering, polarised = self.mixture.scattering, self.mixture.polarised
         seen = turned(add(scattering), add(polarised), basis, mixed, self.stokes)
         seen = seen.reshape(self.stokes, -1, mixed.shape[1] // wl, wl)
         found = contract("asm,ak,smkl->asl", around, bright, seen[:, :, :width])
-        if self.ground is None:
+        if ground is None:
             return found
-        lit = jax.lax.dynamic_slice_in_dim(self.ground.lit, start, width, 0)
+        lit = jax.lax.dynamic_slice_in_dim(ground.lit, start, width, 0)
         lit = contract("ak,kl->al", bright, lit)
         glow = contract("asm,sml->asl", around, seen[:, :, width]) * lit[:, None]
         return jnp.concatenate([found, glow], 1)

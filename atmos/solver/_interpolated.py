@@ -6,6 +6,7 @@ ground adds is found for ground that shines evenly, and then is exact for any al
 """
 
 import math
+from collections.abc import Iterator
 
 import equinox as eqx
 import jax
@@ -76,6 +77,10 @@ class Chosen(eqx.Module):
         """Whether all are chosen."""
         return self.weights.shape[0] == self.weights.shape[1]
 
+    def of_mixture(self, mixture: Mixture) -> Mixture:
+        """The media at some wavelengths."""
+        return jax.tree.map(lambda x: x[..., self.index], mixture)
+
     def smooth(self, known: Float[Array, "*n few"]) -> Float[Array, "*n wl"]:
         """At all wavelengths, what is known at some."""
         return known if self.whole else contract("...k,kl->...l", known, self.weights)
@@ -104,45 +109,66 @@ def misfit(depth: Float[Array, "*n wl"], wavelength: Wavelength, count: int) -> 
     return jnp.where(apart, most, math.inf)
 
 
+class Glow(eqx.Module):
+    """The fluxes of ground that shines evenly, with radiance 1, and how it is `lit`.
+
+    As they balance, unlike those of `Ground`, which may be known better.
+    """
+
+    up: Float[Array, "level wl"]
+    down: Float[Array, "level wl"]
+    lit: Float[Array, "sun wl"]
+
+
 class Interpolated(AbstractField):
     """A field at some wavelengths, over ground apart; everything else at all."""
 
     mixture: Mixture
     chosen: Chosen
     field: Field
+    ground: Ground
+    glow: Glow
     albedo: Float[Array, "wl"]
 
-    @property
-    def _ground(self) -> Ground:
-        assert self.field.ground is not None
-        return self.field.ground
-
-    def _returned(self) -> Float[Array, "wl"]:
+    def _returned(self, back: Float[Array, "few"]) -> Float[Array, "wl"]:
         """The radiance of ground over what it would receive if it were black."""
         # Of its light, what does not come down again.
-        lost = 1.0 - self._ground.down[0] / math.pi
+        lost = 1.0 - back / math.pi
         if not self.chosen.whole:
             lost = jnp.exp(self.chosen.smooth(jnp.log(lost)))
         return self.albedo / (1.0 - self.albedo + self.albedo * lost) / math.pi
 
-    def fluxes(self, scene: Scene, light: Sun, point: Point) -> tuple[Depth, Depth]:
+    def _guide(self, scene: Scene, light: Sun, point: Point) -> Float[Array, "wl"]:
+        """How much comes straight from a light: fluxes are of its kind."""
+        path = scene.geometry.path(point, light.direction)
+        column = columns(scene, path, path.span(scene.top).far, nodes=8)
+        return jnp.exp(-contract("m,ml->l", column, self.mixture.extinction))
+
+    def _mixed(self, light: Sun, point: Point, *known: Array) -> Iterator[Array]:
+        """Of what is known for each sun, that of a light."""
         zenith = zenith_angle(point.up, light.direction)
         first, by_sun = self.field.suns.between(light, zenith)
         suns = first + jnp.arange(len(by_sun), dtype=jnp.int32)
-        lit = contract("j,jl->l", by_sun, self._ground.lit[suns])
+        return (contract("j,jl->l", by_sun, x[suns]) for x in known)
+
+    def fluxes(self, scene: Scene, light: Sun, point: Point) -> tuple[Depth, Depth]:
+        (lit,) = self._mixed(light, point, self.glow.lit)
         levels, by_level = between(self.field.altitude, point.altitude)
         glow = lambda x: lit * contract("i,il->l", by_level, x[levels])
         black = self.field.fluxes(scene, light, point)
-        # Diffuse light is alike to that which comes straight.
-        path = scene.geometry.path(point, light.direction)
-        column = columns(scene, path, path.span(scene.top).far, nodes=8)
-        guide = jnp.exp(-contract("m,ml->l", column, self.mixture.extinction))
+        guide = self._guide(scene, light, point)
+        returned, like = self._returned(self.glow.down[0]), self.chosen.like
         up, down = (
-            self.chosen.like(x, guide)
-            + self._returned() * self.chosen.like(glow(y), guide)
-            for x, y in zip(black, (self._ground.up, self._ground.down), strict=True)
+            like(x, guide) + returned * like(glow(y), guide)
+            for x, y in zip(black, (self.glow.up, self.glow.down), strict=True)
         )
         return up, down
+
+    def received(self, scene: Scene, light: Sun, foot: Point) -> Depth:
+        sky, lit = self._mixed(light, foot, self.ground.sky, self.ground.lit)
+        guide, like = self._guide(scene, light, foot), self.chosen.like
+        again = like(lit * self.ground.back, guide)
+        return like(sky, guide) + self._returned(self.ground.back) * again
 
     def gather(
         self,
@@ -155,13 +181,14 @@ class Interpolated(AbstractField):
         *,
         nodes: int,
     ) -> Float[Array, "light stokes wl"]:
-        found, column = self.field.along(scene, light, towards, sight, nodes)
+        known = scene, light, towards, sight, nodes
+        found, column = self.field.along(*known, self.ground)
         irradiance = light.irradiance.evaluate(wavelength)
         irradiance = jnp.broadcast_to(irradiance, wavelength.shape)
         found = found * irradiance[self.chosen.index][None, None]
         guide = jnp.sum(once[:, :-1], 1)
         black, glow = (self._drawn(x, guide) for x in jnp.split(found, 2, 1))
-        seen = black + glow * self._returned()[None, None]
+        seen = black + glow * self._returned(self.ground.back)[None, None]
 
         down = self.sent_down(scene, light, towards, sight)
         depth = contract("m,ml->l", column, self.mixture.extinction)

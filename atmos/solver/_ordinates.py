@@ -53,20 +53,17 @@ def solve_column(
     *,
     nodes: int,
 ) -> Diffuse:
-    """The diffuse light in layers, top first, over black ground, and from the ground.
+    """The diffuse light in layers, top first, over black ground, and of such ground.
 
     `scattering` is the depth of scattering times the moments of the phase function, no
     more than twice the ordinates to either side, `nodes`. `polarised` is that times the
     moments of polarisation; with no degree of these it is radiance alone that is found.
     `slant` is the optical depth along the beam to each level, and `cosine` that of the
-    zenith angle of where it comes from.
+    zenith angle of where it comes from. The last sun is to be none, whose light does
+    not arrive, as the ground shines in its place.
     """
     count, k = scattering.shape[1], polarised.shape[1]
     matrix = [scattering, *(polarised[:, :, i] for i in range(3))]
-    # In place of one more sun, from which nothing arrives, the ground shines.
-    none = jnp.full_like(slant[:, :1], math.inf)
-    slant = jnp.concatenate([slant, none], 1)
-    cosine = jnp.concatenate([cosine, jnp.zeros_like(cosine[:1])])
     solve = lambda made, known: _solve(made, depth, known, slant, cosine)
     # Orders of azimuth that polarisation has no part in are solved without it.
     parts = []
@@ -107,8 +104,7 @@ def _solve(
     lit = beam * constant(sides), beam * constant(~sides)
     into = lambda a, b: jnp.einsum("...l,lw->...w", a, b, precision="highest")
 
-    fall = jnp.diff(slant[:, :-1], axis=0)
-    fall = jnp.concatenate([fall, jnp.zeros_like(slant[1:, :1])], 1)
+    fall = jnp.diff(slant, axis=0)
     doublings = _doublings(depth / float(made.cosine[0]), fall)
     small = jnp.exp2(-doublings.astype(depth.dtype))
 

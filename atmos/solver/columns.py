@@ -16,7 +16,8 @@ from ..transport import columns, contract
 from ._base import check_stokes
 from ._diffuse import AbstractDiffuse, Diffused
 from ._field import Field, Ground
-from ._interpolated import Chosen, Interpolated, misfit
+from ._follow import follow
+from ._interpolated import Chosen, Glow, Interpolated, misfit
 from ._ordinates import solve_column
 from ._peaks import Peaks
 from ._suns import FlatSuns, RoundSuns
@@ -29,6 +30,9 @@ _LOWEST = 85.001 * deg
 # So many wavelengths do where all optical depths are so close to what is drawn through
 # them: radiances are then within 1e-3 or so.
 _FEW, _SMOOTH = 10, 0.01
+# Moments that near-level light tells from a peak: with 16 the brightest haze there is
+# off by 0.4 %, with 24 by 0.05 %.
+_RESOLVED = 32
 # Of light that meets so much more on its way into the shadow nothing is left there.
 _SHADE, _NIGHT = 16.0, 1e3
 
@@ -37,12 +41,18 @@ class Columns(AbstractDiffuse):
     """All orders of scattering, as if the air lay flat around every place.
 
     Discrete ordinates, half of `streams` to either side, without the forward peaks of
-    phase functions (delta-M, Wiscombe 1977), in `layers` layers; light that turned once
-    is added in the round and with its peak (Nakajima and Tanaka 1988), and so is what
-    peaks alone turned more than once. Diffuse light is kept by altitude and, where the
-    world is round, for `suns` zenith angles of each light, whose rays reach a column
-    along their own curved way. A line of sight takes `nodes` places in each of `pieces`
-    pieces.
+    phase functions (delta-M, Wiscombe 1977), in `layers` layers. Where these are thin,
+    what they send is then followed along twice as many directions, in a flat world with
+    narrower peaks. Light that turned once is added in the round and with its peak
+    (Nakajima and Tanaka 1988), and so is what peaks alone turned more than once.
+    Diffuse light is kept by altitude and, where the world is round, for `suns` zenith
+    angles of each light, whose rays reach a column along their own curved way. A line
+    of sight takes `nodes` places in each of `pieces` pieces.
+
+    Diffuse light is found at `wavelengths` of all wavelengths and drawn out to the
+    rest, relative to light that turned once. Where that is left open they are 10 if the
+    air is smooth enough, which leaves 1e-4 of the radiance and nowhere more than 2e-3,
+    and all if it is not, or cannot be known as its numbers are traced.
 
     With `stokes` 3 the light is polarised, which changes its radiance too.
 
@@ -127,7 +137,7 @@ class Columns(AbstractDiffuse):
         peaks = Peaks.of(scene, wavelength, self.degrees, self.stokes)
         mixed = peaks.without
         chosen = Chosen.of(wavelength, self.wavelengths or _FEW)
-        few = jax.tree.map(lambda x: x[..., chosen.index], mixed)
+        few = chosen.of_mixture(mixed)
         cut = layers(scene, mixed.extinction, self.layers)
         lights = jnp.array([x.zenith for x in scene.suns], wavelength.dtype)
         last = 0.5 * jnp.pi + scene.geometry.dip(scene.top, jnp.zeros_like(scene.top))
@@ -136,43 +146,47 @@ class Columns(AbstractDiffuse):
         zeniths = suns.zeniths()
         at = jax.vmap(_towards, (None, 0, None))
         found, dark = jax.vmap(at, (None, None, 0), 1)(scene, cut.altitude, zeniths)
-        slant = jnp.einsum("ksm,ml->ksl", found, few.extinction, precision="highest")
-        slant = _shaded(slant, dark[:, :, None])
-        total = lambda x: contract("km,m...->k...", cut.column, x)
-        cosine = jnp.cos(zeniths)
-        # Levels from the ground up, as fields have them.
-        light = jax.tree.map(
-            lambda x: x[::-1],
-            solve_column(
-                total(few.extinction)[::-1],
-                total(few.scattering)[::-1],
-                slant[::-1],
-                cosine,
-                total(few.polarised)[::-1],
-                nodes=self.streams // 2,
-            ),
-        )
-        moments = jnp.swapaxes(light.moments, 1, 2)
-        direct = jnp.maximum(cosine, 0.0)[:, None] * jnp.exp(-slant[0])
-        ground = Ground(
-            moments[:, :, -1],
-            light.up[:, -1],
-            light.down[:, -1],
-            direct + light.down[0, :-1],
-        )
+        # Levels from the top down, as light is solved for; and in place of one more sun
+        # the ground.
+        shaded = lambda x: _shaded(contract("ksm,ml->ksl", found, x), dark[:, :, None])
+        none = ((0, 0), (0, 1), (0, 0))
+        slant_of = lambda x: jnp.pad(shaded(x), none, constant_values=_NIGHT)[::-1]
+        total = lambda x: contract("km,m...->k...", cut.column, x)[::-1]
+        cosine = jnp.concatenate([jnp.cos(zeniths), jnp.zeros_like(zeniths[:1])])
+        slant = slant_of(few.extinction)
+        column = total(few.extinction), total(few.scattering)
+        more = slant, cosine, total(few.polarised)
+        light = solve_column(*column, *more, nodes=self.streams // 2)
+        arrives = lambda x: jnp.maximum(cosine, 0.0)[:, None] * jnp.exp(-x[-1])
+        lit = arrives(slant) + light.down[-1]
+        glow = Glow(light.up[::-1, -1], light.down[::-1, -1], lit[:-1])
+
+        # In the round, peaks that matter near level are no better than flat air is.
+        resolved = self.degrees
+        if flat:
+            resolved = max(resolved, min(2 * resolved, _RESOLVED))
+        peaks = Peaks.of(scene, wavelength, resolved, self.stokes)
+        mixed, passed = peaks.without, slant
+        few = chosen.of_mixture(mixed)
+        slant = slant_of(few.extinction)
+        column = total(few.extinction), total(few.scattering)
+        more = slant, passed, cosine, total(few.polarised)
+        light, sky = follow(light, *column, *more, nodes=self.streams)
+        lit = arrives(slant) + sky
+        moments = jnp.swapaxes(light.moments[::-1], 1, 2)
+        ground = Ground(moments[:, :, -1], sky[:-1], lit[:-1], sky[-1])
         field = Field(
             few,
             cut.altitude,
             suns,
             moments[:, :, :-1],
-            light.up[:, :-1],
-            light.down[:, :-1],
+            light.up[::-1, :-1],
+            light.down[::-1, :-1],
             jnp.zeros((len(cut.altitude), len(zeniths)), wavelength.dtype),
             self.stokes,
-            ground,
         )
         albedo = jnp.broadcast_to(scene.ground.evaluate(wavelength), wavelength.shape)
-        field = Interpolated(mixed, chosen, field, albedo)
+        field = Interpolated(mixed, chosen, field, ground, glow, albedo)
         return Diffused(field, peaks, jnp.zeros((), wavelength.dtype))
 
 
