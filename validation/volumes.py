@@ -52,7 +52,7 @@ from atmos.solver import (
 from .claim import Claim, main
 
 
-MARCH, SMALL = RayMarching(Skipping(256), ShadowCache(96)), 64
+MARCH, SMALL = RayMarching(Skipping(192), ShadowCache(144)), 64
 WIDE = 1e5  # how much wider than high a slab is
 LOOKS = 4096  # directions for each flux, unless told otherwise
 SIZE, LOOKS_A_PIXEL = 16, 256
