@@ -135,7 +135,9 @@ def _cache(
 
     each = jnp.arange(cells, dtype=size.dtype) + 0.5
     row = lambda x: jax.vmap(lambda y: line(x, y))(each)
-    return Cache(lower, light.direction, turn / size[None], offset, jax.lax.map(row, each))
+    return Cache(
+        lower, light.direction, turn / size[None], offset, jax.lax.map(row, each)
+    )
 
 
 def _sheared(
