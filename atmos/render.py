@@ -18,7 +18,7 @@ from .sky import AbstractPanorama, AbstractSky
 
 _BLOCK = 2**13  # pixels that are worked on together, so that they stay in the cache
 _STRETCH = 2**20  # pixels between two reports of progress
-_RAYS, _RAY_STRETCH = 2**11, 2**15  # the same where each pixel is a ray of its own
+_RAYS, _RAY_STRETCH = 2**9, 2**15  # the same where each pixel is a ray of its own
 _TILE = 32  # pixels along an edge of what is looked at together
 # One of each, so that what is compiled for a picture serves the next.
 _RADIANCE, _STOKES = operator.attrgetter("radiance"), operator.attrgetter("stokes")

@@ -244,6 +244,28 @@ def test_a_cache_of_shadows_keeps_amounts_and_not_what_arrives():
     assert np.percentile(off, 99.0) < 0.02 and np.median(off) < 0.005
 
 
+@pytest.mark.parametrize("axis", range(3))
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_a_cache_of_shadows_of_a_box_is_how_deep_one_is_in_it(axis, sign):
+    places = rng.uniform(LOWER, UPPER, (400, 3))
+    for slant, allowed in ((0.0, 1e-12), (0.3, 0.02)):
+        towards = np.full(3, slant)
+        towards[axis] = sign
+        towards = towards / np.linalg.norm(towards)
+        world = scene(Medium(Box(LOWER, UPPER), 1.0), sun=towards)
+        cache = ShadowCache(40)
+        ahead = cache.towards(cache.prepare(world), world, world.lights[0])
+        look = jax.jit(jax.vmap(lambda x, ahead=ahead: ahead(Flat().locate(x))[0]))
+        walls = np.where(towards > 0.0, UPPER, LOWER) - places
+        with np.errstate(divide="ignore", invalid="ignore"):
+            due = np.min(np.where(towards == 0.0, np.inf, walls / towards), 1)
+        off = np.abs(np.asarray(look(jnp.asarray(places))) - due)
+        assert np.mean(off) < allowed
+        # A light behind all of it has nothing before it.
+        beyond = jnp.asarray(places + 10.0 * towards)
+        assert np.all(np.asarray(look(beyond)) == 0.0)
+
+
 def test_layered_air_is_that_of_single_scattering():
     air = Medium(Exponential(8e3), PowerLaw(1.2e-5, -4.0), phase=Rayleigh())
     dust = Medium(Exponential(1.2e3), 2e-5, 5e-6, HenyeyGreenstein(0.7))

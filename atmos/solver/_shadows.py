@@ -10,10 +10,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, PyTree
 
-from ..geometry import Point
+from ..geometry import AbstractPath, Point
 from ..light import Sun
+from ..medium import AbstractProfile
 from ..medium._trilinear import trilinear
-from ..quantity import dot, Position
+from ..quantity import Direction, dot, inner, Position
 from ..scene import Scene
 from ..transport import column
 
@@ -46,20 +47,31 @@ class ShadowRays(AbstractShadows):
         return lambda point: _columns(scene, light, point, every, self.nodes)
 
 
+# Looks at the media in each cell of a cache.
+_LOOKS = 2
+
+
 class Cache(eqx.Module):
-    """How much lies between each node of a box and each light, of media in boxes."""
+    """How much lies between each node and a light, of media in boxes.
+
+    The nodes lie on lines to the light. A place has the coordinates
+    `turn @ (place - lower) + offset`, in cells: two across the lines, which do not
+    change along them, and one along, which rises towards the light.
+    """
 
     lower: Position
-    upper: Position
-    directions: Float[Array, "light 3"]
-    columns: Float[Array, "light nx ny nz bounded"]
+    direction: Direction
+    turn: Float[Array, "3 3"]
+    offset: Float[Array, "3"]
+    columns: Float[Array, "cell cell place bounded"]
 
 
 class ShadowCache(AbstractShadows):
-    """Rays to the lights from a grid, with `cells` along each axis, and lines between.
+    """Lines to the lights through a grid, and in between by interpolation.
 
-    For the media that lie in boxes, in a box about them all; for the others a ray from
-    every place, with `nodes` a piece. It blurs shadows by the size of its cells.
+    For the media that lie in boxes, in a box about them all, with `cells` along each
+    axis; for the others a ray from every place, with `nodes` a piece. It blurs shadows
+    by the size of its cells, which slanting light draws out to up to twice that.
     """
 
     cells: int = eqx.field(static=True, default=64)
@@ -76,40 +88,94 @@ class ShadowCache(AbstractShadows):
         boxes = [scene.media[i].profile.box for i in bounded]
         lower = jnp.min(jnp.stack([x[0] for x in boxes if x is not None]), 0)
         upper = jnp.max(jnp.stack([x[1] for x in boxes if x is not None]), 0)
-        axis = np.linspace(0.0, 1.0, self.cells + 1)
-        share = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), -1)
-        share = jnp.asarray(share.reshape(-1, 3), lower.dtype)
-        shape = (self.cells + 1,) * 3
-
-        def look(light, share):
-            point = scene.geometry.locate(lower + share * (upper - lower))
-            return _columns(scene, light, point, bounded, self.nodes)
-
-        tables = [
-            jax.lax.map(lambda x, light=light: look(light, x), share, batch_size=2**14)
-            for light in scene.suns
+        # A box without room holds nothing.
+        size = jnp.where(upper > lower, upper - lower, 1.0)
+        caches = [
+            _cache(scene, x, bounded, lower, size, self.cells) for x in scene.suns
         ]
-        return Cache(
-            lower,
-            upper,
-            jnp.stack([x.direction for x in scene.suns]),
-            jnp.stack([x.reshape(*shape, len(bounded)) for x in tables]),
-        )
+        return jax.tree.map(lambda *x: jnp.stack(x), *caches)
 
     def towards(self, prepared: Cache | None, scene: Scene, light: Sun) -> Columns:
         bounded, others = _sorted(scene)
         if prepared is None:
             return lambda point: _columns(scene, light, point, others, self.nodes)
-        cosines = dot(prepared.directions, light.direction)
-        table = prepared.columns[jnp.argmax(cosines)]
+        nearest = jnp.argmax(dot(prepared.direction, light.direction))
+        cache = jax.tree.map(lambda x: x[nearest], prepared)
         order = np.argsort(np.array([*bounded, *others]))
 
         def columns(point):
             far = _columns(scene, light, point, others, self.nodes)
-            near = _look_up(prepared, table, light, point.position)
+            near = _look_up(cache, point.position)
             return jnp.concatenate([near, far])[order]
 
         return columns
+
+
+def _cache(
+    scene: Scene,
+    light: Sun,
+    which: list[int],
+    lower: Position,
+    size: Position,
+    cells: int,
+) -> Cache:
+    """What lies on lines to a light that fill a box."""
+    turn, offset = _sheared(light.direction / size, cells)
+    back = size[:, None] * jnp.linalg.inv(turn)
+    apart = cells * back[:, 2]
+    step = jnp.sqrt(dot(apart, apart)) / (cells * _LOOKS)
+    edges = jnp.arange(cells * _LOOKS + 1, dtype=size.dtype) * step
+
+    def line(x, y):
+        place = jnp.stack([x, y, jnp.zeros_like(x)])
+        start = scene.geometry.locate(lower + dot(back, place - offset))
+        path = scene.geometry.path(start, light.direction)
+        found = [_ahead(scene, scene.media[i].profile, path, edges) for i in which]
+        return jnp.stack(found, -1)
+
+    each = jnp.arange(cells, dtype=size.dtype) + 0.5
+    row = lambda x: jax.vmap(lambda y: line(x, y))(each)
+    return Cache(
+        lower, light.direction, turn / size[None], offset, jax.lax.map(row, each)
+    )
+
+
+def _sheared(
+    light: Float[Array, "3"], cells: int
+) -> tuple[Float[Array, "3 3"], Float[Array, "3"]]:
+    """The matrix and the offset of a cache, for places in a box from 0 to 1.
+
+    Planes across the axis that the light comes along most, in that box, are moved until
+    lines to the light stand upright on them.
+    """
+    axis = jnp.argmax(jnp.abs(light))
+    axes = (axis + jnp.arange(1, 4)) % 3
+    unit = jnp.eye(3, dtype=light.dtype)[axes]
+    slant = light[axes[:2]] / light[axis]
+    across = cells / (1.0 + jnp.abs(slant))
+    turn = across[:, None] * (unit[:2] - slant[:, None] * unit[2:])
+    rises = light[axis] > 0.0
+    along = jnp.where(rises, unit[2:], -unit[2:]) * cells
+    ends = jnp.where(rises, jnp.zeros_like(across[:1]), cells)
+    offset = jnp.concatenate([across * jnp.maximum(slant, 0.0), ends])
+    return jnp.concatenate([turn, along]), offset
+
+
+def _ahead(
+    scene: Scene,
+    profile: AbstractProfile,
+    path: AbstractPath,
+    edges: Float[Array, "edge"],
+) -> Float[Array, "place"]:
+    """How much of a medium lies ahead of places on a ray, one every few looks at it."""
+    breaks = profile.breaks(path)
+    edges = jnp.clip(edges, breaks[0], breaks[-1])
+    points = jax.vmap(path.at)(0.5 * (edges[:-1] + edges[1:]))
+    density = jax.vmap(profile.density)(points)
+    amount = jnp.where(points.altitude <= scene.top, density, 0.0) * jnp.diff(edges)
+    amount = jnp.sum(amount.reshape(-1, _LOOKS), 1)
+    ahead = jnp.cumsum(amount[::-1])[::-1]
+    return jnp.concatenate([ahead, jnp.zeros_like(ahead[:1])])
 
 
 def _sorted(scene: Scene) -> tuple[list[int], list[int]]:
@@ -128,26 +194,11 @@ def _columns(
     return jnp.stack(found) if found else jnp.zeros(0, far.dtype)
 
 
-def _look_up(
-    cache: Cache,
-    table: Float[Array, "nx ny nz bounded"],
-    light: Sun,
-    position: Position,
-) -> Float[Array, "bounded"]:
-    slope = light.direction
-    slope = jnp.where(jnp.abs(slope) < 1e-12, 1e-12, slope)
-    cells = jnp.array(table.shape[:3], slope.dtype) - 1.0
-    each, faster = cells / (cache.upper - cache.lower), 1.0 / slope
-    enter, leave = jnp.zeros_like(position[0]), jnp.full_like(position[0], jnp.inf)
+def _look_up(cache: Cache, position: Position) -> Float[Array, "bounded"]:
+    apart = position - cache.lower
     # One number at a time: XLA on CPUs is slow with vectors of three.
-    for axis in range(3):
-        one, other = (
-            (x[axis] - position[axis]) * faster[axis]
-            for x in (cache.lower, cache.upper)
-        )
-        enter = jnp.maximum(enter, jnp.minimum(one, other))
-        leave = jnp.minimum(leave, jnp.maximum(one, other))
-    # From outside, all that counts lies beyond where the ray to the light enters.
-    position = position + enter * light.direction
-    places = [(position[i] - cache.lower[i]) * each[i] for i in range(3)]
-    return jnp.where(leave > enter, trilinear(table, *places), 0.0)
+    x, y, place = (inner(cache.turn[i], apart) + cache.offset[i] for i in range(3))
+    cells = cache.columns.shape[0]
+    meets = (x >= 0.0) & (x <= cells) & (y >= 0.0) & (y <= cells)
+    found = trilinear(cache.columns, x - 0.5, y - 0.5, place)
+    return jnp.where(meets, found, 0.0)

@@ -29,6 +29,10 @@ class Skipping(AbstractSteps):
         if self.cells < 1:
             raise ValueError(f"`cells` must be at least 1; got {self.cells}.")
 
+    @property
+    def pieces(self) -> int:
+        return 1
+
     def prepare(self, scene: Scene, wavelength: Wavelength) -> Cells | None:
         for i, x in enumerate(scene.media):
             if x.profile.box is None:

@@ -32,6 +32,11 @@ class AbstractSteps(eqx.Module):
 
     count: eqx.AbstractVar[int]
 
+    @property
+    def pieces(self) -> int:
+        """Into how many a ray is cut before it is marched along."""
+        return self.count
+
     def prepare(self, scene: Scene, wavelength: Wavelength) -> PyTree[Any]:
         """What can be worked out before the first look; None if nothing."""
         return None

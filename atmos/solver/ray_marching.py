@@ -169,7 +169,7 @@ class RayMarching(AbstractSolver):
         return Ray(
             scene=scene,
             path=path,
-            cuts=cut(scene, path, far, others, self.steps.count),
+            cuts=cut(scene, path, far, others, self.steps.pieces),
             extinction=extinctions(scene, wavelength),
             source=source,
             weights=weights,
