@@ -11,7 +11,8 @@ from .colour import preview
 from .image import letter
 
 
-_DARK = 1e-3  # of the brightest pixel: differences are relative to that at least
+_DARK = 1e-3  # of bright pixels: differences are relative to that at least
+_BRIGHT = 0.99  # of all that is lit so much is darker: the sun's disk is none of it
 # Where the second picture is darker, alike, brighter: sRGB of 8 bits.
 _DARKER, _ALIKE, _BRIGHTER = (33, 102, 172), (247, 247, 247), (178, 24, 43)
 _STEPS = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0]
@@ -47,14 +48,15 @@ class Difference(NamedTuple):
 def relative(one: XYZ, other: XYZ) -> Float[np.ndarray, "height width"]:
     """How much brighter the second is, relative to the first.
 
-    To a thousandth of its brightest pixel where that is more. Raises `ValueError`
-    unless the pictures are alike in size, finite, and the first has light.
+    To a thousandth of its bright pixels, but for the brightest hundredth, where that is
+    more: so a sun's disk hides nothing. Raises `ValueError` unless the pictures are
+    alike in size, finite, and the first has light.
     """
     one, other = _checked(one, other)
     first, second = one[..., 1], other[..., 1]
     if not first.max() > 0.0:
         raise ValueError("`one` must have light somewhere; it is black.")
-    return (second - first) / np.maximum(first, _DARK * first.max())
+    return (second - first) / np.maximum(first, _DARK * _bright(first))
 
 
 def compare(one: XYZ, other: XYZ, weight: Weight | None = None) -> Difference:
@@ -67,7 +69,8 @@ def compare(one: XYZ, other: XYZ, weight: Weight | None = None) -> Difference:
     counted = np.broadcast_to(solid, shape).ravel()
     change = relative(one, other).ravel()
     one, other = _checked(one, other)
-    lit = np.minimum(one[..., 1], other[..., 1]).ravel() > _DARK * one[..., 1].max()
+    darker = np.minimum(one[..., 1], other[..., 1]).ravel()
+    lit = darker > _DARK * _bright(one[..., 1])
     apart = np.linalg.norm(_chromaticity(one) - _chromaticity(other), axis=-1).ravel()
     seen = counted * lit
     return Difference(
@@ -122,6 +125,12 @@ def side_by_side(
     for i, text in enumerate(lines):
         texts[gap, top + size + row + i * row] = text
     return letter(page, texts, size)
+
+
+def _bright(luminance: np.ndarray) -> float:
+    """The brightest pixel, but for the brightest hundredth of those that are lit."""
+    lit = luminance[luminance > 0.0]
+    return float(np.quantile(lit, _BRIGHT, method="higher"))
 
 
 def _checked(one: XYZ, other: XYZ) -> tuple[np.ndarray, np.ndarray]:

@@ -31,10 +31,19 @@ def test_figures_count_solid_angles():
     np.testing.assert_allclose(found[1:4], [0.0, 2.0, 2.0])
 
 
-def test_what_is_dark_is_relative_to_a_thousandth_of_the_brightest():
+def test_what_is_dark_is_relative_to_a_thousandth_of_what_is_bright():
     one, other = GREY.copy(), GREY.copy()
     one[0, 0], other[0, 0] = 0.0, 1e-3 * GREY[0, 0]
     np.testing.assert_allclose(relative(one, other)[0, 0], 0.5)
+
+
+def test_a_sun_in_both_pictures_does_not_hide_how_their_skies_differ():
+    one = np.tile(GREY, (30, 30, 1))
+    other = 1.25 * one
+    one[50, 60] = other[50, 60] = 1e6 * GREY[0, 0]
+    found = compare(one, other)
+    np.testing.assert_allclose([found.median, found.most], 0.25, rtol=1e-12)
+    assert relative(one, other)[50, 60] == 0.0
 
 
 def test_colours_differ_as_the_cie_says():

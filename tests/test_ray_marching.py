@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from hostile import decades, drawn, within
-from hypothesis import given
+from hypothesis import given, strategies as st
 
 from atmos import render
 from atmos.camera import Perspective
@@ -282,24 +282,23 @@ def test_layered_air_is_that_of_single_scattering():
         np.testing.assert_allclose(found, due, rtol=2e-3, atol=1e-3 * due.max())
 
 
+@jax.jit
+@ft.partial(jax.value_and_grad, argnums=(0, 1, 2, 3, 4))
+def radiance(values, scattering, absorption, g, emission):
+    medium = Medium(
+        Grid(values, LOWER, UPPER),
+        scattering=scattering,
+        absorption=absorption,
+        phase=HenyeyGreenstein(g),
+        emission=Glow(emission),
+    )
+    solver = RayMarching(Fixed(30), ShadowRays(8))
+    sky = solve(scene(medium, sun=SLANT), solver, jnp.asarray(NM))
+    return jnp.sum(sky.radiance(*(jnp.asarray(x[0]) for x in RAYS)))
+
+
 def test_gradients_are_those_of_differences():
     values = rng.uniform(0.5, 1.5, (3, 3, 3))
-    nm, solver = jnp.asarray(NM), RayMarching(Fixed(30), ShadowRays(8))
-    start, along = (jnp.asarray(x[0]) for x in RAYS)
-
-    @jax.jit
-    @ft.partial(jax.value_and_grad, argnums=(0, 1, 2, 3, 4))
-    def radiance(values, scattering, absorption, g, emission):
-        medium = Medium(
-            Grid(values, LOWER, UPPER),
-            scattering=scattering,
-            absorption=absorption,
-            phase=HenyeyGreenstein(g),
-            emission=Glow(emission),
-        )
-        sky = solve(scene(medium, sun=SLANT), solver, nm)
-        return jnp.sum(sky.radiance(start, along))
-
     at = [jnp.asarray(x, float) for x in (values, 0.8, 0.3, 0.4, 0.2)]
     _, slopes = radiance(*at)
     for i, slope in enumerate(slopes):
@@ -401,3 +400,14 @@ def test_random_boxes_are_bright(scattering, absorption, g, up, ground):
     sun = np.array([np.sqrt(1.0 - up * up), 0.0, up])
     found = seen(scene(box, sun=sun, ground=ground), MARCH, *RAYS)
     assert np.all(np.isfinite(found) & (found >= 0.0))
+
+
+@drawn(200)
+@given(DENSE, DENSE, within(-0.99, 0.99, 0.0), DENSE, st.integers(0, 2**27 - 1))
+def test_random_grids_have_slopes(scattering, absorption, g, emission, full):
+    """However thick, with any of its 27 nodes empty."""
+    values = (full >> np.arange(27) & 1).reshape(3, 3, 3)
+    numbers = (values, scattering, absorption, g, emission)
+    value, slopes = radiance(*(jnp.asarray(x, float) for x in numbers))
+    assert np.isfinite(value) and value >= 0.0
+    assert all(np.all(np.isfinite(x)) for x in slopes)

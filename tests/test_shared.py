@@ -57,12 +57,12 @@ UP, DOWN = VIEWS[:, 2] > 0.0, VIEWS[:, 2] < 0.0
 
 
 @eqx.filter_jit
-def looks(scene, solver):
+def looks(scene, solver, dtype=float):
     """From the ground and from the top, in every direction."""
-    sky = solve(scene, solver, NM)
-    at = jnp.array([[0.0, 0.0, 0.0], [0.0, 0.0, DEEP]])
+    sky = solve(scene, solver, jnp.asarray(NM, dtype))
+    at = jnp.array([[0.0, 0.0, 0.0], [0.0, 0.0, DEEP]], dtype)
     see = jax.vmap(jax.vmap(sky.radiance, (None, 0)), (0, None))
-    return see(at, VIEWS)[..., 0]
+    return see(at, jnp.asarray(VIEWS, dtype))[..., 0]
 
 
 def numbers(air=0.0, haze=0.0, g=0.0, albedo=1.0, cosine=0.87, ground=0.0):
@@ -157,6 +157,14 @@ def test_gradients_agree_with_differences():
     for i, step in enumerate(1e-5 * np.eye(3)):
         due = (total(start + step) - total(start - step)) / 2e-5
         assert abs(slope[i] / due - 1.0) < 1e-5, i
+
+
+@pytest.mark.parametrize("cosine", [1.0, 0.5, 0.05])
+def test_single_precision_agrees_with_double(cosine):
+    scene = slab(*numbers(0.2, 0.3, 0.7, 0.95, cosine, 0.3))
+    found, due = looks(scene, SHARED, jnp.float32), looks(scene, SHARED)
+    assert found.dtype == jnp.float32
+    np.testing.assert_allclose(found, due, rtol=1e-4, atol=1e-6 * due.max())
 
 
 def test_twilight_fades_and_never_falls_below_nothing():

@@ -20,11 +20,12 @@ from atmos.medium import (
     Uniform,
 )
 from atmos.phase import HenyeyGreenstein, Rayleigh
-from atmos.scene import Scene
+from atmos.quantity import deg
+from atmos.scene import earth, Scene
 from atmos.solver import Fixed, RayMarching, ShadowRays, SingleScattering, solve
 from atmos.solver._tally import joined
-from atmos.spectrum import BandAverage, planck, PowerLaw, Tabulated
-from atmos.transport import optical_depth
+from atmos.spectrum import BandAverage, Constant, planck, PowerLaw, Tabulated
+from atmos.transport import direct_irradiance, optical_depth
 
 
 KNOTS = np.array([400.0, 500.0, 600.0])
@@ -79,6 +80,50 @@ def test_a_table_that_ends_before_the_picture_is_refused(nm):
     scene = Scene(Flat(), 1e5, (gas,), (sun,), 0.0)
     with pytest.raises(ValueError, match="must cover .* known from 400 to 600 nm"):
         solve(scene, SingleScattering(), np.array(nm))
+
+
+@pytest.mark.parametrize("dtype", [jnp.float32, jnp.float64])
+def test_where_no_light_is_left_it_is_known_how_much_was_lost(dtype):
+    """Past a depth of 87 no number of single precision is as small as what is left."""
+    up, nm = jnp.array([0.0, 0.0, 1.0], dtype), jnp.array([310.0], dtype)
+
+    def world(depth):
+        gas = Medium(Uniform(0.0, 1e3), absorption=depth / 1e3)
+        scene = Scene(Flat(), 1e3, (gas,), (Sun(up, 1.0, 0.0),), 0.5)
+        return jax.tree.map(lambda x: x.astype(dtype), scene)
+
+    def thick(depth):
+        return optical_depth(world(depth), jnp.zeros_like(up), up, nm)[0]
+
+    def beam(depth):
+        scene = world(depth)
+        return direct_irradiance(scene, scene.lights[0], jnp.zeros_like(up), nm)[0]
+
+    depths = jnp.array([80.0, 87.0, 88.0, 100.0, 1e4], dtype)
+    look = lambda x: jax.jit(jax.vmap(jax.value_and_grad(x)))(depths)
+    found, slope = look(thick)
+    np.testing.assert_allclose(found, depths, rtol=1e-6)
+    np.testing.assert_allclose(slope, 1.0, rtol=1e-6)
+    left, slope = look(beam)
+    due = np.exp(-np.asarray(depths, float))
+    np.testing.assert_allclose(left, due, rtol=2e-5, atol=1e-37)
+    np.testing.assert_allclose(slope, -due, rtol=2e-5, atol=1e-37)
+
+
+def test_ozone_keeps_the_zenith_blue_after_sunset():
+    """Without it, long ways through the air would leave it yellow (Hulburt 1953)."""
+    nm, zenith = jnp.array([450.0, 600.0]), jnp.array([0.0, 0.0, 1.0])
+
+    @jax.jit
+    def blueness(elevation, column):
+        sun = Sun.at(0.5 * jnp.pi - elevation * deg, 0.0, Constant(1.0), 0.0)
+        sky = solve(earth(sun, ozone_column=column), SingleScattering(), nm)
+        blue, orange = sky.radiance(2.0 * zenith, zenith)
+        return blue / orange
+
+    day, dusk = (blueness(x, 300.0) / blueness(x, 0.0) for x in (60.0, -4.0))
+    assert 1.0 < day < 1.1
+    assert dusk > 2.0
 
 
 @pytest.mark.parametrize("dtype", [jnp.float32, jnp.float64])

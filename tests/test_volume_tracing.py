@@ -1,6 +1,7 @@
 """Light of all orders in clouds and fire, judged in standard errors."""
 
 import dataclasses
+import functools
 
 import equinox as eqx
 import jax
@@ -48,12 +49,12 @@ def cloud(profile, scattering, absorption, g, sun=SLANT, exponent=0.0):
     return Scene(Flat(), 1e8, (medium,), (Sun(sun, 1.0, 0.0),))
 
 
-def tallied(scene, positions, directions):
+def tallied(scene, positions, directions, solver=SOLVER):
     """Means and standard errors, always of so many looks that tests share compilations.
 
     In single precision, as pictures are made.
     """
-    sky = solve(scene, SOLVER, jnp.asarray(NM, jnp.float32))
+    sky = solve(scene, solver, jnp.asarray(NM, jnp.float32))
     repeat = LOOKS // len(positions)
     looks = [np.repeat(x, repeat, 0) for x in (positions, directions)]
     # No two looks are alike, or they would be alike in all that is random too.
@@ -261,7 +262,18 @@ def test_a_grid_and_a_box_look_alike_and_a_peak_aside_changes_nothing():
     assert np.all(empty[0] == 0.0)
 
 
-@drawn(5)
+def test_bounds_far_too_high_change_nothing():
+    # They cost a hundred times as many collisions with nothing, and no more.
+    smoke = cloud(GRID, 1.0, 0.2, 0.4)
+    due, error = tallied(smoke, START, AIM)
+    for slack in (10.0, 100.0):
+        loose = dataclasses.replace(SOLVER, slack=slack)
+        mean, other = tallied(smoke, START, AIM, loose)
+        assert np.all(np.abs(mean - due) <= 4.5 * np.hypot(error, other))
+        assert np.all(other < 0.3 * mean)
+
+
+@drawn(12)
 @given(
     decades(1e-6, 10.0, 0.0),
     decades(1e-6, 1e3, 0.0),
@@ -293,36 +305,56 @@ def test_light_that_is_never_absorbed_comes_to_an_end():
     assert np.all((mean > 0.0) & (mean < 1.0 / np.pi))
 
 
-def test_gradients_are_those_of_differences():
-    # How dense it is, how white, and how far ahead it scatters; the bounds stay.
-    rng = np.random.default_rng(0)  # whatever was drawn before
-    at = jnp.array([1.0, 0.9, 0.5], jnp.float32)
-    solver = dataclasses.replace(SOLVER, slack=2.0)
+@jax.jit
+def moved(prepared, scene, looks, numbers, ahead):
+    """What one sees of a box of other numbers, and how that changes with them."""
     nm = jnp.asarray(NM, jnp.float32)
-    repeat = LOOKS // len(START)
-    looks = [np.repeat(x, repeat, 0) for x in (START, AIM)]
-    looks[0] = looks[0] * (1.0 + 1e-6 * rng.uniform(-1.0, 1.0, (LOOKS, 1)))
-    looks = [jnp.asarray(x, jnp.float32) for x in looks]
-    sky = solve(cloud(BOX, 0.45, 0.05, 0.5), solver, nm)
+    solver = dataclasses.replace(SOLVER, slack=2.0)
 
     def seen(numbers):
         dense, albedo, g = numbers
         parts = [Constant(0.5 * dense * x) for x in (albedo, 1.0 - albedo)]
         medium = Medium(BOX, *parts, HenyeyGreenstein(Constant(g)))
-        scene = dataclasses.replace(sky.scene, media=(medium,), ground=Constant(0.3))
-        scene = jax.tree.map(lambda x: x.astype(nm.dtype), scene)
-        return solver.tally(sky.prepared, scene, scene.lights[0], nm, *looks).mean
+        other = dataclasses.replace(scene, media=(medium,), ground=Constant(0.3))
+        other = jax.tree.map(lambda x: x.astype(nm.dtype), other)
+        return solver.tally(prepared, other, other.lights[0], nm, *looks).mean
 
-    look = jax.jit(lambda at, ahead: jax.jvp(seen, (at,), (ahead,)))
+    return jax.jvp(seen, (numbers,), (ahead,))
+
+
+@functools.cache
+def box():
+    """A box of optical depth 1, prepared for up to twice that, and looks at it."""
+    rng = np.random.default_rng(0)  # whatever was drawn before
+    solver = dataclasses.replace(SOLVER, slack=2.0)
+    sky = solve(cloud(BOX, 0.45, 0.05, 0.5), solver, jnp.asarray(NM, jnp.float32))
+    looks = [np.repeat(x, LOOKS // len(START), 0) for x in (START, AIM)]
+    looks[0] = looks[0] * (1.0 + 1e-6 * rng.uniform(-1.0, 1.0, (LOOKS, 1)))
+    return sky.prepared, sky.scene, [jnp.asarray(x, jnp.float32) for x in looks]
+
+
+def test_gradients_are_those_of_differences():
+    # How dense it is, how white, and how far ahead it scatters; the bounds stay.
+    at = jnp.array([1.0, 0.9, 0.5], jnp.float32)
+    look = lambda at, ahead: moved(*box(), at, ahead)
     for one, step in zip(jnp.eye(3, dtype=jnp.float32), (0.2, 0.08, 0.1), strict=True):
         ends = [look(at + sign * step * one, one)[0] for sign in (1.0, -1.0)]
         both = look(at, one)[1], (ends[0] - ends[1]) / (2.0 * step)
         found = [np.asarray(x, float).mean(1) for x in both]
-        parts = [x.reshape(-1, repeat) for x in found]
+        parts = [x.reshape(len(START), -1) for x in found]
         mean, due = (x.mean(1) for x in parts)
-        error = [x.std(1, ddof=1) / np.sqrt(repeat) for x in parts]
+        error = [x.std(1, ddof=1) / np.sqrt(x.shape[1]) for x in parts]
         assert np.all(np.abs(mean - due) < 4.0 * np.hypot(*error))
         assert np.any(np.hypot(*error) < 0.2 * np.abs(due))
+
+
+@drawn(24)
+@given(decades(1e-6, 2.0, 0.0), within(0.0, 1.0), within(-0.99, 0.99, 0.0))
+def test_random_boxes_have_slopes(dense, albedo, g):
+    at, ahead = jnp.array([dense, albedo, g], jnp.float32), jnp.ones(3, jnp.float32)
+    found, slope = moved(*box(), at, ahead)
+    assert np.all(np.isfinite(found) & (found >= 0.0))
+    assert np.all(np.isfinite(slope))
 
 
 def test_fire_shines_and_lights_the_smoke_around_it():

@@ -4,6 +4,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from hostile import decades, drawn, rows, within
+from hypothesis import given
 
 from atmos.geometry import Flat, Spherical
 from atmos.light import Sun
@@ -79,6 +81,25 @@ def test_a_cloud_that_covers_all_one_sees_is_a_layer_of_the_air():
     spread = np.hypot(one[1], other[1])
     assert np.all(spread < 0.25 * one[0])
     assert np.all(np.abs(one[0] - other[0]) < 4.0 * spread)
+
+
+DENSE, SHARE = decades(1e-7, 0.02, 0.0), within(0.0, 1.0)
+ANGLE = within(0.0, 180.0, 90.0, 90.001)
+EYE = decades(1e-3, 1e7, 0.0, 1e3, 2e3, 60e3)
+
+
+@drawn(4)
+@given(DENSE, DENSE, within(-0.99, 0.99), SHARE, ANGLE, rows(4, EYE, ANGLE, ANGLE))
+def test_random_cloudy_skies_are_bright(dense, dark, g, ground, zenith, looks):
+    """Seen from anywhere, under suns however high or low."""
+    altitude, *views = looks.T
+    views = np.stack([towards(*x) for x in zip(*views, strict=True)])
+    cloud = Medium(Product(LAYER, NEAR), dense, dark, HenyeyGreenstein(g))
+    sun = Sun(towards(zenith, 0.0), 2.0, 0.0)
+    scene = Scene(ROUND, 60e3, (AIR, cloud), (sun,), ground)
+    solver = VolumeTracing(walks=8, paths=16)
+    mean, error = tallied(scene, altitude, views, solver)
+    assert np.all(np.isfinite(mean) & (mean >= 0.0) & np.isfinite(error))
 
 
 PROFILES = {

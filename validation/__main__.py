@@ -2,9 +2,10 @@
 
     python -m validation --truth ../shared/truth --traced truth.npz
 
-writes `validation/report.html`: every claim with its source, what was expected and what
+writes `report/report.html`: every claim with its source, what was expected and what
 was measured, the chart of speed and accuracy and the maps of errors if there are any,
 and what was left out for want of tables or programs. Exits with 1 where a claim fails.
+Truth by path tracing that no file has is traced into the folder.
 By default what takes minutes is left out; `--all` takes it in, `--part` chooses. Parts
 that are done are kept in the folder: `--keep` goes on from there.
 """
@@ -48,6 +49,7 @@ PARTS = {
     "colour": Part("Colours"),
     "speed": Part("Speed", True, False, ("--no-commands",)),
 }
+TRUTH = "truth.npz"
 PEERS = [
     *("mitsuba", "nanodisort", "pvlib", "pyradiance", "PythonicDISORT", "sasktran2"),
     *("matplotlib",),
@@ -75,7 +77,7 @@ def run(name: str, arguments: argparse.Namespace) -> Outcome:
         command += ["--truth", str(arguments.truth)]
     if name == "orders":
         command += ["--scenes", str(arguments.scenes)]
-        command += ["--traced", str(arguments.traced)] if arguments.traced else []
+        command += ["--traced", str(arguments.traced or arguments.folder / TRUTH)]
     file.unlink(missing_ok=True)
     start = time.perf_counter()
     done = subprocess.run(command, capture_output=True, text=True)
@@ -226,8 +228,8 @@ def main() -> int:
     tables = arguments.truth.is_dir()
     if not tables:
         missing.append(f"what reads published tables: {arguments.truth} is no folder")
-    if "orders" in wanted and not (arguments.traced and arguments.traced.exists()):
-        missing.append("all orders in the round: `--traced` names no file")
+    if "orders" in wanted and not arguments.scenes.is_dir():
+        missing.append(f"orders, whose scenes are not in {arguments.scenes}")
         wanted.remove("orders")
     missing += [f"not asked for: {', '.join(idle)}"] if idle else []
     found = {}

@@ -1,5 +1,6 @@
 """A sky as seen from one place: a table that is quick to look up."""
 
+import dataclasses
 import functools as ft
 import math
 import operator
@@ -24,19 +25,25 @@ _FINER = 4
 
 
 class Resolution(eqx.Module):
-    """How many rings lie above and below the horizon; azimuths on half of each."""
+    """How many rings lie above and below the horizon; azimuths on half of each.
+
+    Rings above it lie at the powers `crowded` of even steps.
+    """
 
     above: int = eqx.field(static=True)
     below: int = eqx.field(static=True)
     around: int = eqx.field(static=True)
+    crowded: int = eqx.field(static=True, default=3)
 
 
 # What is enough up to which zenith angle of the light.
 _ENOUGH = [
     (80.0 * deg, Resolution(48, 32, 9)),
     (88.0 * deg, Resolution(96, 48, 17)),
-    (90.5 * deg, Resolution(96, 48, 33)),
-    (math.inf, Resolution(192, 48, 65)),
+    (90.0 * deg, Resolution(96, 48, 33)),
+    # The planet's shadow has an edge among what one sees: where the light stands about
+    # level, between there and the horizon, which from near the ground are close by.
+    (math.inf, Resolution(192, 48, 65, crowded=5)),
 ]
 _HIGH = 20.0 * km  # from here on up the thick air is a thin line
 
@@ -50,7 +57,7 @@ def fine_enough(altitude: float, lowest: float, around: int) -> Resolution:
     size = next(size for most, size in _ENOUGH if lowest <= most)
     if altitude > _HIGH:
         size = Resolution(192, 48, 2 * size.around - 1)
-    return Resolution(size.above, size.below, max(size.around, around))
+    return dataclasses.replace(size, around=max(size.around, around))
 
 
 class Grid(eqx.Module):
@@ -68,7 +75,8 @@ class Grid(eqx.Module):
     def zeniths(self) -> Float[Array, "ring"]:
         """The zenith angle of each ring, from the highest to the lowest."""
         dtype = self.horizon.dtype
-        up = jnp.linspace(1.0, 0.0, self.resolution.above, dtype=dtype) ** 3
+        up = jnp.linspace(1.0, 0.0, self.resolution.above, dtype=dtype)
+        up = up**self.resolution.crowded
         up = jnp.where(self.first > 0.0, up * (2.0 - up), up)
         down = jnp.linspace(0.0, 1.0, self.resolution.below, dtype=dtype) ** 5
         top, bottom = self.horizon - _SLIVER, self.horizon + _SLIVER
@@ -88,7 +96,7 @@ class Grid(eqx.Module):
         up = (top - zenith) / jnp.maximum(top - self.first, _SLIVER)
         rest = jnp.maximum(1.0 - up, 0.0)
         up = jnp.where(self.first > 0.0, up / (1.0 + _root(rest, jnp.sqrt)), up)
-        up = _root(up, jnp.cbrt)
+        up = _root(up, lambda x: x ** (1.0 / self.resolution.crowded))
         down = _root((zenith - bottom) / (math.pi - bottom), lambda x: x**0.2)
         return jnp.where(
             zenith > self.horizon,
@@ -300,6 +308,7 @@ class Panorama(AbstractPanorama):
             above=_FINER * (size.above - 1) + 1,
             below=_FINER * (size.below - 1) + 1,
             around=_FINER * (size.around - 1) + 1,
+            crowded=size.crowded,
         )
         grid = Grid(self.grid.first, self.grid.horizon, size)
         mixing, odd = self._mixing(grid.azimuths()), int(self._polarised)
