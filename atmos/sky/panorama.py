@@ -21,24 +21,27 @@ from ._base import AbstractPanorama
 
 # Rings keep this far off the horizon, so that rounding leaves no doubt on which side.
 _SLIVER = 1e-5
-_FINER = 4
+# How much finer a grid is that is joined by straight lines; azimuths on it, at least.
+_FINER, _AROUND = 4, 33
 
 
 class Resolution(eqx.Module):
     """How many rings lie above and below the horizon; azimuths on half of each.
 
-    Rings above it lie at the powers `crowded` of even steps.
+    One azimuth in `every` is enough for light that turned once. Rings above the horizon
+    lie at the powers `crowded` of even steps.
     """
 
     above: int = eqx.field(static=True)
     below: int = eqx.field(static=True)
     around: int = eqx.field(static=True)
+    every: int = eqx.field(static=True, default=1)
     crowded: int = eqx.field(static=True, default=3)
 
 
 # What is enough up to which zenith angle of the light.
 _ENOUGH = [
-    (80.0 * deg, Resolution(48, 32, 9)),
+    (80.0 * deg, Resolution(48, 32, 5)),
     (88.0 * deg, Resolution(96, 48, 17)),
     (90.0 * deg, Resolution(96, 48, 33)),
     # The planet's shadow has an edge among what one sees: where the light stands about
@@ -57,7 +60,10 @@ def fine_enough(altitude: float, lowest: float, around: int) -> Resolution:
     size = next(size for most, size in _ENOUGH if lowest <= most)
     if altitude > _HIGH:
         size = Resolution(192, 48, 2 * size.around - 1)
-    return dataclasses.replace(size, around=max(size.around, around))
+    every = max((around - 1) // (size.around - 1), 1)
+    around = max(size.around, around)
+    every = every if (around - 1) % every == 0 else 1
+    return dataclasses.replace(size, around=around, every=every)
 
 
 class Grid(eqx.Module):
@@ -302,12 +308,12 @@ class Panorama(AbstractPanorama):
         return eqx.tree_at(lambda x: x.table, self, table)
 
     def finer(self) -> "Panorama":
-        """The same on a grid four times as fine: for pictures that are not in rows."""
+        """The same on a finer grid: for pictures that are not in rows."""
         size = self.grid.resolution
         size = Resolution(
             above=_FINER * (size.above - 1) + 1,
             below=_FINER * (size.below - 1) + 1,
-            around=_FINER * (size.around - 1) + 1,
+            around=max(_FINER * (size.around - 1) + 1, _AROUND),
             crowded=size.crowded,
         )
         grid = Grid(self.grid.first, self.grid.horizon, size)

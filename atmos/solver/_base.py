@@ -89,8 +89,14 @@ class AbstractSolver(eqx.Module):
         wavelength: Wavelength,
         position: Position,
         direction: Direction,
+        every: int = 1,
     ) -> Float[Array, "light part wl"]:
-        """The same for a light that stands in one of several directions instead."""
+        """The same for a light that stands in one of several directions instead.
+
+        Where these lie on half a circle, from the azimuth of the view to the opposite
+        one, it is enough to know for `every` so many of them what varies little.
+        """
+        del every
 
         def of(towards):
             stands = dataclasses.replace(light, direction=towards)

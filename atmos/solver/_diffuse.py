@@ -3,7 +3,6 @@
 import dataclasses
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
@@ -11,6 +10,7 @@ from ..light import Sun
 from ..quantity import Direction, dot, Irradiance, Number, Position, Wavelength
 from ..scene import Scene
 from ..transport import columns, contract, extinctions
+from ._azimuths import drawn
 from ._base import AbstractSolver
 from ._field import AbstractField
 from ._peaks import Peaks
@@ -72,6 +72,7 @@ class AbstractDiffuse(AbstractSolver):
         wavelength: Wavelength,
         position: Position,
         direction: Direction,
+        every: int = 1,
     ) -> Float[Array, "light part wl"]:
         field, peaks = prepared.field, prepared.peaks
         look = position, direction
@@ -81,12 +82,13 @@ class AbstractDiffuse(AbstractSolver):
         def once(towards):
             stands = dataclasses.replace(light, direction=towards)
             lit = scene, fewer.extinction, stands, wavelength
-            found = self.single.march(*lit, *look)
-            if peaks is None:
-                return found, jnp.zeros_like(wavelength)
-            return found, peaks.scattered(scene, stands, wavelength, line)
+            return self.single.march(*lit, *look)
 
-        found, more = jax.vmap(once)(towards)
+        found = drawn(once, towards, every)
+        more = jnp.zeros_like(found[:, -1])
+        if peaks is not None:
+            known = scene, light, towards, wavelength, line
+            more = peaks.scattered(*known, every)
         known = scene, light, towards, wavelength, line, found
         again = field.gather(*known, nodes=self.nodes)
         found = found.at[:, -1].add(more + again[:, 0])

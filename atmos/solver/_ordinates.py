@@ -22,7 +22,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 
 from ._basis import Basis, basis
 from ._harmonics import harmonics, pairs
@@ -106,12 +106,12 @@ def _solve(
 
     fall = jnp.diff(slant, axis=0)
     doublings = _doublings(depth / float(made.cosine[0]), fall)
-    small = jnp.exp2(-doublings.astype(depth.dtype))
 
     @jax.checkpoint
     def up(below, layer):
         stack, light = below
-        depth, scattering, top, fall = layer
+        depth, scattering, top, fall, doublings = layer
+        small = jnp.exp2(-doublings.astype(depth.dtype))
         thin = along * (small * depth)[None, None, None]
         b, a = (thin - into(x, small * scattering) for x in turn)
         arrives = small * jnp.exp(-top)[None, :, None]
@@ -134,7 +134,7 @@ def _solve(
     c = constant(np.where(intensity, np.sqrt(made.weight * made.cosine), 0.0))
     ground = _ground(c, constant(made.orders == 0), jnp.zeros_like(slant[0]))
     (stack, light), layers = jax.lax.scan(
-        up, ground, (depth, scattering, slant[:-1], fall), reverse=True
+        up, ground, (depth, scattering, slant[:-1], fall, doublings), reverse=True
     )
     # At the top nothing comes down: s = d.
     top = product(inverse_of(identity(stack) - stack), light)
@@ -155,11 +155,13 @@ def _solve(
     return moments, flux(sums + differences), flux(sums - differences)
 
 
-def _doublings(steepest: Array, fall: Array) -> Array:
-    """How often to halve the layers until their slices are thin enough."""
-    largest = 0.5 * jnp.maximum(jnp.max(steepest), jnp.max(fall, initial=0.0))
-    found = jnp.ceil(jnp.log2(jnp.maximum(jax.lax.stop_gradient(largest) / START, 1.0)))
-    return found.astype(jnp.int32)
+def _doublings(
+    steepest: Float[Array, "layer wl"], fall: Float[Array, "layer sun wl"]
+) -> Int[Array, "layer"]:
+    """How often to halve each layer until its slices are thin enough."""
+    largest = jnp.maximum(jnp.max(steepest, 1), jnp.max(fall, (1, 2), initial=0.0))
+    halves = jnp.maximum(0.5 * jax.lax.stop_gradient(largest) / START, 1.0)
+    return jnp.ceil(jnp.log2(halves)).astype(jnp.int32)
 
 
 def _ground(c: Array, first: Array, none: Array) -> tuple[Array, Array]:

@@ -23,7 +23,7 @@ from jaxtyping import Array, Float
 
 from ..light import Sun
 from ..optics import Mixture, mixture
-from ..quantity import dot, Radiance, Versine, versine, Wavelength
+from ..quantity import dot, Versine, versine, Wavelength
 from ..scene import Scene
 from ..transport import (
     columns,
@@ -32,6 +32,7 @@ from ..transport import (
     densities,
     gauss_legendre,
 )
+from ._azimuths import drawn
 from ._harmonics import legendre
 from ._sight import Sight
 
@@ -79,56 +80,66 @@ class Peaks(eqx.Module):
         self,
         scene: Scene,
         light: Sun,
+        towards: Float[Array, "light 3"],
         wavelength: Wavelength,
         sight: Sight,
-    ) -> Radiance:
-        """What light that turned in peaks adds to that which turned once."""
+        every: int,
+    ) -> Float[Array, "light wl"]:
+        """What light that turned in peaks adds to that which turned once.
+
+        Of a light that stands in one of several directions. How much there is on its
+        way is found for `every` so many of them.
+        """
         if not self.sharp:
-            return jnp.zeros_like(wavelength)
+            return jnp.zeros((len(towards), wavelength.size), wavelength.dtype)
         path, far, length = sight.path, sight.far, sight.length
-        gone, met = self.without.extinction, self.within.extinction
         u, w = (jnp.asarray(x, far.dtype) for x in gauss_legendre(_NODES))
         places = sight.begin[:, None] + length[:, None] * u[None]
-        begins, ends = path.shadow(light.direction, jnp.zeros_like(far))
-        lit = (places <= begins) | (places >= ends)
-
-        def ahead(place):
-            point = path.at(place)
-            sunwards = scene.geometry.path(point, light.direction)
-            end = sunwards.span(scene.top).far
-            found = columns(scene, sunwards, end, nodes=_LIGHT_NODES)
-            return densities(scene, point), found, dot(point.up, light.direction)
-
         # The last of the places is where the line of sight ends.
-        found = jax.vmap(ahead)(jnp.append(places.ravel(), far))
-        cells = lambda x: x[:-1].reshape(*places.shape, x.shape[-1])
-        density, sunwards, rise = found
-        amount = cells(density) * length[:, None, None]
+        points = jax.vmap(path.at)(jnp.append(places.ravel(), far))
+        density = jax.vmap(lambda x: densities(scene, x))(points)
+
+        def ahead(towards):
+            def of(point):
+                sunwards = scene.geometry.path(point, towards)
+                end = sunwards.span(scene.top).far
+                return columns(scene, sunwards, end, nodes=_LIGHT_NODES)
+
+            return jax.vmap(of)(points)
+
+        amount = density[:-1].reshape(*places.shape, -1) * length[:, None, None]
         whole = contract("j,pjm->pm", w, amount)
         inner = jnp.asarray(cumulative(_NODES), far.dtype)
         before = jnp.cumsum(whole, 0) - whole
         passed = before[:, None] + contract("ij,pjm->pim", inner, amount)
-        passed = passed + cells(sunwards)
-        event = jnp.where(lit[:, :, None], amount * w[None, :, None], 0.0)
-        flat = lambda x: x.reshape(-1, x.shape[-1])
-        event, passed = flat(event), flat(passed)
+        weighed = amount * w[None, :, None]
         depth = lambda columns, x: contract("...m,ml->...l", columns, x)
-        turned = self._turned(
-            event,
-            passed,
-            jnp.exp(-depth(passed, gone)),
-            depth(passed, met),
-            versine(path.direction, light.direction),
-        )
+        gone, met = self.without.extinction, self.within.extinction
+        flat = lambda x: x.reshape(-1, x.shape[-1])
+        albedo = scene.ground.evaluate(wavelength) / math.pi
+        up = points.up[-1]
 
-        passed = jnp.sum(whole, 0) + sunwards[-1]
-        more = jnp.exp(-depth(passed, gone)) - jnp.exp(-depth(passed, met))
-        ground = (
-            scene.ground.evaluate(wavelength) / math.pi * jnp.maximum(rise[-1], 0.0)
-        )
-        shown = sight.grounded & ~((begins < far) & (far < ends))
-        total = turned + jnp.where(shown, ground * more, 0.0)
-        return total * light.irradiance.evaluate(wavelength)
+        def of(towards, sunwards):
+            begins, ends = path.shadow(towards, jnp.zeros_like(far))
+            lit = (places <= begins) | (places >= ends)
+            event = flat(jnp.where(lit[:, :, None], weighed, 0.0))
+            there = flat(passed) + sunwards[:-1]
+            turned = self._turned(
+                event,
+                there,
+                jnp.exp(-depth(there, gone)),
+                depth(there, met),
+                versine(path.direction, towards),
+            )
+            there = jnp.sum(whole, 0) + sunwards[-1]
+            more = jnp.exp(-depth(there, gone)) - jnp.exp(-depth(there, met))
+            ground = albedo * jnp.maximum(dot(up, towards), 0.0) * more
+            shown = sight.grounded & ~((begins < far) & (far < ends))
+            return turned + jnp.where(shown, ground, 0.0)
+
+        irradiance = light.irradiance.evaluate(wavelength)
+        found = jax.vmap(of)(towards, drawn(ahead, towards, every))
+        return found * irradiance[None]
 
     def _turned(
         self,

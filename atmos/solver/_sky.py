@@ -158,9 +158,10 @@ def _tabulate(sky: SolvedSky, position: Position, resolution: Resolution) -> Pan
     """The sky on a grid of directions, one light after the other."""
     grid, phases, sides, zenith, azimuth = _frame(sky, position, resolution)
     rings, around = resolution.above + resolution.below, resolution.around
+    every = resolution.every if around <= _AROUND else 1
 
     def table(light):
-        look = lambda x, y: _looks(sky, light, position, x, y)
+        look = lambda x, y: _looks(sky, light, position, x, y, every)
         if any(isinstance(x, Tracer) for x in jax.tree.leaves((sky, position))):
             # A gradient would else keep every place on every ray.
             block = jax.checkpoint(look)
@@ -221,6 +222,7 @@ def _looks(
     position: Position,
     zenith: Float[Array, "ring"],
     azimuth: Float[Array, "around"],
+    every: int,
 ) -> Float[Array, "ring around part wl"]:
     """What one sees by one light, in azimuths relative to it, for a panorama's table.
 
@@ -245,7 +247,7 @@ def _looks(
         direction = jnp.stack([flat * east, flat * north, up])
         look = sky.wavelength, position, direction
         found = sky.solver.scattered_from(
-            sky.prepared, sky.scene, light, towards, *look
+            sky.prepared, sky.scene, light, towards, *look, every
         )
         parts, rest = [], found[:, len(terms) :]
         for part, mixture in zip(jnp.moveaxis(found, 1, 0), terms, strict=False):

@@ -49,7 +49,7 @@ class Shared(AbstractDiffuse):
     scattered, peaks apart, from the ground straight up.
     """
 
-    around: ClassVar[int] = 9
+    around: ClassVar[int] = 5
     layers: int = eqx.field(static=True, default=32)
     suns: int = eqx.field(static=True, default=32)
     pieces: int = eqx.field(static=True, default=10)

@@ -43,7 +43,7 @@ class SingleScattering(AbstractSolver):
     to 40 % at 600 m: 30 `nodes` and 16 `light_nodes` make that 0.1 %.
     """
 
-    around: ClassVar[int] = 9
+    around: ClassVar[int] = 5
     nodes: int = eqx.field(static=True, default=10)
     light_nodes: int = eqx.field(static=True, default=8)
     pieces: int = eqx.field(static=True, default=28)
