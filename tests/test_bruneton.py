@@ -197,12 +197,13 @@ def _down(numbers_, slope):
 def test_slopes_agree_with_differences():
     at = np.array([0.2, 0.1, 0.9, 0.3, RADIUS, 0.5])
     for i in (0, 2, 3):
-        step = 1e-4 * at[i] * np.eye(6)[i]
+        # Small, as now and then a line of sight is cut otherwise.
+        step = 1e-5 * at[i] * np.eye(6)[i]
         _, slope = _down(jnp.asarray(at), jnp.asarray(step))
         more, less = (
             _down(jnp.asarray(at + x), jnp.zeros(6))[0] for x in (step, -step)
         )
-        assert float(slope) == pytest.approx(0.5 * float(more - less), rel=1e-3)
+        assert float(slope) == pytest.approx(0.5 * float(more - less), rel=1e-5)
     sky = tables(numbers())
     for step in ((1e-4, 0.0), (0.0, 0.1)):
         at = np.array([DAY[1], 1e3])
