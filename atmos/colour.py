@@ -36,9 +36,14 @@ def response(wavelength: Wavelength) -> Float[Array, "wl 3"]:
     Raises `ValueError` unless there are two or more rising wavelengths whose bands hold
     90 % of each matching function.
     """
-    nm, observer = matching_functions()
     if not isinstance(wavelength, Tracer):
         _check(np.asarray(wavelength, float))
+    return _response(wavelength)
+
+
+@jax.jit
+def _response(wavelength: Wavelength) -> Float[Array, "wl 3"]:
+    nm, observer = matching_functions()
     first, last = wavelength[:2], wavelength[-2:]
     edges = jnp.concatenate(
         [
@@ -97,11 +102,13 @@ class AbstractColourSpace(eqx.Module):
     def signed(self) -> bool:
         """Whether visible colours may have values below 0."""
 
+    @jax.jit
     def from_xyz(self, xyz: Float[Array, "*batch 3"]) -> Float[Array, "*batch 3"]:
         """The values of a colour; below 0 where it lies outside the gamut."""
         matrix = jnp.asarray(self.tables.matrix.T / EFFICACY, xyz.dtype)
         return jnp.matmul(xyz, matrix, precision="highest")
 
+    @jax.jit
     def to_xyz(self, values: Float[Array, "*batch 3"]) -> Float[Array, "*batch 3"]:
         """Back from `from_xyz`: Y is in cd m^-2."""
         matrix = np.linalg.inv(self.tables.matrix.T / EFFICACY)
@@ -167,6 +174,7 @@ COLOUR_SPACES = {
 }
 
 
+@jax.jit
 def automatic_exposure(xyz: Float[Array, "*batch 3"]) -> Number:
     """The exposure value (ISO 100) that suits a picture of a sky.
 

@@ -6,10 +6,11 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from .camera import AbstractCamera
 from .light import Sun
+from .quantity import Angle, as_float, Number
 from .render import Response
 from .sky import AbstractSky
 
@@ -30,55 +31,57 @@ def render_disks(
     """
     dtype = sky.wavelength.dtype
     camera = jax.tree.map(lambda x: x.astype(dtype), camera)
-    count = sky.wavelength.size
-    response = jnp.eye(count, dtype=dtype) if response is None else response
+    if response is None:
+        response = as_float(np.eye(sky.wavelength.size, dtype=dtype))
     image = np.zeros((camera.height, camera.width, response.shape[1]), dtype)
-    extent = _extent(camera)
     for light in sky.lights:
         radius = float(light.angular_radius)
         if radius <= 0.0:
             continue
-        rows, columns = _near(camera, light, radius + extent)
+        near, largest = _near(camera, light)
+        rows, columns = np.nonzero(np.asarray(near))
         if not rows.size:
             continue
-        samples = _samples(camera, radius, rows, columns)
+        samples = _samples(float(largest), radius, rows.size)
         together = _TOGETHER // samples
         depths = _depths(sky, camera, light)
         for i in range(0, rows.size, together):
             part = slice(i, i + together)
             pixels = np.stack([columns[part], rows[part]], -1).astype(dtype)
             filled = np.pad(pixels, ((0, together - len(pixels)), (0, 0)), mode="edge")
-            seen = _pixels(
-                sky, camera, light, depths, jnp.asarray(filled), response, samples
-            )
+            filled = as_float(filled)
+            seen = _pixels(sky, camera, light, depths, filled, response, samples)
             image[rows[part], columns[part]] += np.asarray(seen)[: len(pixels)]
     return image
 
 
+@eqx.filter_jit
 def _near(
-    camera: AbstractCamera, light: Sun, reach: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """The rows and columns of the pixels whose centres lie within reach of a light."""
-    zenith, azimuth = (np.asarray(x) for x in camera.angles())
-    apart = np.sin(0.5 * (zenith - np.asarray(light.zenith)))
-    aside = np.sin(0.5 * (azimuth - np.asarray(light.azimuth)))
-    level = np.sin(zenith) * np.sin(np.asarray(light.zenith))
+    camera: AbstractCamera, light: Sun
+) -> tuple[Bool[Array, "height width"], Number]:
+    """The pixels that may see a light, and the largest solid angle of any of them."""
+    zenith, azimuth = camera.angles()
+    apart = jnp.sin(0.5 * (zenith - light.zenith))
+    aside = jnp.sin(0.5 * (azimuth - light.azimuth))
+    level = jnp.sin(zenith) * jnp.sin(light.zenith)
+    reach = light.angular_radius + _extent(camera)
     near = apart * apart + level * aside * aside <= (0.5 * reach) ** 2
-    rows, columns = np.nonzero(near & np.asarray(camera.sees()))
-    return rows, columns
+    near = jnp.broadcast_to(near & camera.sees(), (camera.height, camera.width))
+    dtype = camera.position.dtype
+    x, y = (jnp.arange(n, dtype=dtype) + 0.5 for n in (camera.width, camera.height))
+    across = jax.vmap(camera.solid_angle, (0, None))
+    areas = jax.vmap(across, (None, 0))(x, y)
+    return near, jnp.max(areas, where=near, initial=0.0)
 
 
-def _samples(
-    camera: AbstractCamera, radius: float, rows: np.ndarray, columns: np.ndarray
-) -> int:
+def _samples(largest: float, radius: float, count: int) -> int:
     """How many samples a pixel takes, so that a disk meets `_MET` or more in all."""
-    x, y = (jnp.asarray(z + 0.5, camera.position.dtype) for z in (columns, rows))
-    share = float(jnp.max(jax.vmap(camera.solid_angle)(x, y))) / (math.pi * radius**2)
-    fewest = 8 if rows.size < 2**15 else 4
+    share = largest / (math.pi * radius**2)
+    fewest = 8 if count < 2**15 else 4
     return 2 ** min(max(math.ceil(math.log2(share * _MET)), fewest), 16)
 
 
-def _extent(camera: AbstractCamera) -> float:
+def _extent(camera: AbstractCamera) -> Angle:
     """The largest angle from the centre of a pixel to a corner, or somewhat more."""
     steps = jnp.linspace(0.5, 8.5, 9, dtype=camera.position.dtype) / 9.0
     y, x = (
@@ -87,7 +90,7 @@ def _extent(camera: AbstractCamera) -> float:
     centre = jax.vmap(camera.direction)(x, y)
     corners = [jax.vmap(camera.direction)(x + 0.5, y + dy) for dy in (-0.5, 0.5)]
     chords = [jnp.sqrt(jnp.sum((corner - centre) ** 2, -1)) for corner in corners]
-    return 1.2 * float(jnp.max(jnp.stack(chords)))
+    return 1.2 * jnp.max(jnp.stack(chords))
 
 
 def _strips(sky: AbstractSky, camera: AbstractCamera, light: Sun):

@@ -7,7 +7,9 @@ wavelength axis `wl` last; `#wl` may be 1 where the wavelength makes no differen
 import math
 from typing import TypeAlias
 
+import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, ArrayLike, Float
 
 
@@ -35,8 +37,17 @@ deg = math.pi / 180.0
 
 def as_float(x: ArrayLike) -> Array:
     """The converter of every field that one might fit: always a floating array."""
+    if isinstance(x, float | int | np.ndarray | np.generic):
+        # What has its final precision JAX need not compile a program to convert.
+        x = np.asarray(x)
+        dtype = jax.dtypes.canonicalize_dtype(_floating(x.dtype))
+        return jnp.asarray(x.astype(dtype), dtype)
     x = jnp.asarray(x)
-    return x.astype(x.dtype if jnp.issubdtype(x.dtype, jnp.floating) else float)
+    return x.astype(_floating(x.dtype))
+
+
+def _floating(dtype: np.dtype) -> np.dtype:
+    return dtype if jnp.issubdtype(dtype, jnp.floating) else np.dtype(float)
 
 
 def versine(a: Direction, b: Direction) -> Versine:

@@ -10,7 +10,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float, Int, Integer
+from jaxtyping import Array, Bool, Float, Int, Integer
 
 from .camera import AbstractCamera
 from .sky import AbstractPanorama, AbstractSky
@@ -79,10 +79,9 @@ def _picture(
     panorama = sky.panorama(camera.position)
     if response is not None and panorama.even:
         panorama, response = _weigh(panorama, response), None
-    zenith, azimuth = camera.angles()
+    zenith, azimuth, sees = _directions(camera)
     if zenith.shape[1] > 1:
         panorama = _finer(panorama)
-        zenith, azimuth = jnp.broadcast_arrays(zenith, azimuth)
     # Stretches alike in size, so that they share one compilation.
     count = -(-camera.height * camera.width // _STRETCH)
     rows = -(-camera.height // count)
@@ -93,7 +92,22 @@ def _picture(
         parts.append(_stretch(panorama, zenith[part], around, response, look))
         progress(min(1.0, (first + rows) / camera.height))
     image = parts[0] if len(parts) == 1 else jnp.concatenate(parts)
-    return _seen(camera, image)
+    return _black(image, sees)
+
+
+@eqx.filter_jit
+def _directions(
+    camera: AbstractCamera,
+) -> tuple[
+    Float[Array, "height #width"],
+    Float[Array, "#height width"],
+    Bool[Array, "#height #width"],
+]:
+    """Where pixels look, each or each row and column; which of them see."""
+    zenith, azimuth = camera.angles()
+    if zenith.shape[1] > 1:
+        zenith, azimuth = jnp.broadcast_arrays(zenith, azimuth)
+    return zenith, azimuth, camera.sees()
 
 
 def _by_rays(
@@ -120,7 +134,8 @@ def _by_rays(
             parts.append(jax.block_until_ready(part))
             progress(len(parts) / len(stretches))
     image = jnp.concatenate(parts)[np.argsort(order)]
-    return _seen(camera, image.reshape(camera.height, camera.width, *image.shape[1:]))
+    image = image.reshape(camera.height, camera.width, *image.shape[1:])
+    return _black(image, camera.sees())
 
 
 def _in_tiles(height: int, width: int) -> Integer[np.ndarray, "pixel"]:
@@ -148,11 +163,10 @@ def _rays(
     return jax.lax.map(one, pixels, batch_size=_RAYS)
 
 
-def _seen(
-    camera: AbstractCamera, image: Float[Array, "height width *channel"]
+def _black(
+    image: Float[Array, "height width *channel"], sees: Bool[Array, "#height #width"]
 ) -> Float[Array, "height width *channel"]:
     """The picture, black where the camera does not see."""
-    sees = camera.sees()
     if sees.size == 1:
         return image
     return jnp.where(jnp.expand_dims(sees, tuple(range(2, image.ndim))), image, 0.0)

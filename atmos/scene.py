@@ -54,7 +54,7 @@ def air() -> Medium:
 def ozone(dobson_units: ArrayLike) -> Medium:
     """An ozone layer from 10 to 40 km (Bruneton 2017); 300 Dobson units are usual."""
     half_width = 15.0 * km
-    most = as_float(dobson_units) * (DOBSON / half_width)
+    most = dobson_units * (DOBSON / half_width)
     return Medium(
         Tent(25.0 * km, half_width),
         absorption=Product(Constant(most), cross_section()),

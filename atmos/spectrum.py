@@ -92,7 +92,7 @@ class BandAverage(AbstractSpectrum):
 
     def __check_init__(self):
         check_table("knots", self.knots, "values", self.values)
-        if not (isinstance(self.bandwidth, Tracer) or self.bandwidth > 0.0):
+        if not (isinstance(self.bandwidth, Tracer) or float(self.bandwidth) > 0.0):
             raise ValueError(f"`bandwidth` must be above 0 nm; got {self.bandwidth}.")
 
     def evaluate(self, wavelength: Wavelength) -> Spectral:

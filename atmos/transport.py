@@ -53,6 +53,7 @@ def cumulative(nodes: int) -> np.ndarray:
     return 0.5 * np.stack(integrals, 1) @ basis
 
 
+@ft.partial(jax.jit, static_argnames="nodes")
 def column(
     profile: AbstractProfile, path: AbstractPath, far: Length, *, nodes: int
 ) -> Length:

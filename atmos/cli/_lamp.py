@@ -11,7 +11,6 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from ..camera import AbstractCamera
-from ..colour import AbstractColourSpace
 from ..light import Sun
 from ..quantity import Irradiance, Position
 from ..rays import angles
@@ -63,10 +62,13 @@ def measure_lamp(
     sky: AbstractSky,
     light: Sun,
     camera: AbstractCamera,
-    space: AbstractColourSpace,
     weights: Float[Array, "wl 3"] | None,
+    response: Float[Array, "wl 3"] | None,
 ) -> Lamp:
-    """What a light gives the observer; `weights` are those of XYZ, where known."""
+    """What a light gives the observer.
+
+    Where known, `weights` are those of XYZ, and `response` those of the picture.
+    """
     position = camera.position.astype(sky.wavelength.dtype)
     found = _beam(sky, light, position)
     zenith, azimuth = angles(np.asarray(light.direction))
@@ -77,11 +79,11 @@ def measure_lamp(
         widths = np.gradient(bands)
         low, high = bands[0] - 0.5 * widths[0], bands[-1] + 0.5 * widths[-1]
         power, band = float(values @ widths), f"from {low:g} to {high:g} nm"
-    if weights is None:
+    if weights is None or response is None:
         return Lamp(90.0 - zenith, azimuth, power, band, None, None)
-    xyz = found @ weights
-    colour = tuple(float(x) for x in space.from_xyz(xyz))
-    return Lamp(90.0 - zenith, azimuth, power, band, float(xyz[1]), colour)
+    illuminance = float(values @ np.asarray(weights)[:, 1])
+    colour = tuple((values @ np.asarray(response)).tolist())
+    return Lamp(90.0 - zenith, azimuth, power, band, illuminance, colour)
 
 
 @eqx.filter_jit

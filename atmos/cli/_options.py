@@ -7,6 +7,8 @@ import os
 from pathlib import Path
 from typing import Annotated, Literal
 
+import numpy as np
+
 from ..camera import AbstractCamera
 from ..image import Attribute
 from ..light import ephemeris
@@ -251,7 +253,7 @@ def check_bake(path: Path | None, solver: str) -> None:
 
 def observed(sun: SunPosition, camera: AbstractCamera) -> dict[str, Attribute]:
     """What the header says of when and where."""
-    place = [round(float(x), 6) for x in camera.position]
+    place = [round(x, 6) for x in np.asarray(camera.position).tolist()]
     found: dict[str, Attribute] = {"altitude": place[2], "position": tuple(place)}
     if sun.date is not None and sun.latitude is not None and sun.longitude is not None:
         found["capDate"] = sun.date.strftime("%Y:%m:%d %H:%M:%S")

@@ -95,12 +95,12 @@ def sky(
         return
     step = (wavelength[-1] - wavelength[0]) / max(1, wavelength.size - 1) or 10.0
     found = make_scene(scene, world, sun, float(step))
-    method = solver_named(chosen, stokes, float(camera.position[2]))
-    aside = np.any(np.asarray(camera.position)[:2] != 0.0)
+    *aside, altitude = np.asarray(camera.position).tolist()
+    method = solver_named(chosen, stokes, altitude)
 
     def solved():
         made = solve_file(found, method, wavelength, scene, bake)
-        if made.has_panorama and aside:
+        if made.has_panorama and any(aside):
             rule = "must lie straight above the origin, in air that is layered"
             refuse("--position", rule, camera.position.tolist())
         return made

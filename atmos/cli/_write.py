@@ -4,7 +4,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
-import jax.numpy as jnp
 import numpy as np
 
 from .. import colour, image
@@ -12,6 +11,7 @@ from ..camera import AbstractCamera, LatLong
 from ..denoise import denoise
 from ..disk import render_disks
 from ..image import Attribute
+from ..quantity import as_float
 from ..render import Response
 from ..sky import AbstractSky
 from ._app import refuse
@@ -50,18 +50,19 @@ def write_picture(
     seen = not spectral or (
         wavelength.size > 1 and colour.has_colour(wavelength.astype(float))
     )
-    bands = jnp.asarray(wavelength)
+    bands = as_float(wavelength)
     weights = colour.response(bands) if seen else None
-    response = None if spectral else space.from_xyz(weights)
+    response = None if weights is None else space.from_xyz(weights)
 
     # First what may be refused.
     sky = made()
-    disks = render_disks(sky, camera, response) if files.sun else np.zeros(1)
+    shown = None if spectral else response
+    disks = render_disks(sky, camera, shown) if files.sun else np.zeros(1)
     if files.half and np.max(disks) > _LARGEST_HALF:
         rule = "cannot hold the sun's disk; leave it to a lamp with --no-sun"
         refuse("--half", rule, f"{np.max(disks):g}")
-    lamps = [measure_lamp(sky, x, camera, space, weights) for x in sky.lights]
-    found = look(sky, camera, response)
+    lamps = [measure_lamp(sky, x, camera, weights, response) for x in sky.lights]
+    found = look(sky, camera, shown)
     picture, layers = found.picture, dict(found.layers)
     if denoises:
         layers["noisy"] = picture
@@ -86,7 +87,7 @@ def write_picture(
     size = f"{camera.width} x {camera.height}"
     print(f"wrote {output}: {size}, {files.colour_space}")
     if preview is not None and seen:
-        xyz = jnp.asarray(picture)
+        xyz = as_float(picture)
         xyz = colour.to_xyz(xyz, bands) if spectral else space.to_xyz(xyz)
         exposure = files.exposure
         if exposure is None:

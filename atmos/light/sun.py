@@ -195,7 +195,7 @@ def sunlight(bandwidth: ArrayLike = 10.0, distance: ArrayLike = 1.0) -> BandAver
     is that of Mars.
     """
     wavelength, irradiance = solar_irradiance()
-    return BandAverage(wavelength, irradiance / as_float(distance) ** 2, bandwidth)
+    return BandAverage(wavelength, irradiance / distance**2, bandwidth)
 
 
 def ephemeris(

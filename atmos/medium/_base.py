@@ -140,7 +140,7 @@ def of_extinction(
 
 def check_above_zero(name: str, value: Array) -> None:
     """Refuses a number that is not finite and above 0, with `ValueError`."""
-    if not isinstance(value, Tracer) and not 0.0 < value < math.inf:
+    if not isinstance(value, Tracer) and not 0.0 < float(value) < math.inf:
         raise ValueError(f"`{name}` must be above 0 and finite; got {value}.")
 
 

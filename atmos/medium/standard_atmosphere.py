@@ -45,12 +45,11 @@ class StandardAtmosphere(AbstractProfile):
         h = point.altitude
         geopotential = h * (_RADIUS / (_RADIUS + h))
         # A chain of selections, not an index: this is the innermost loop of all.
+        passed = [geopotential > base for base in _BASE[1:].tolist()]
         base, lapse, temperature, start = (
             ft.reduce(
-                lambda below, layer: jnp.where(
-                    geopotential > layer[0], layer[1], below
-                ),
-                zip(_BASE[1:].tolist(), table[1:], strict=True),
+                lambda below, layer: jnp.where(layer[0], layer[1], below),
+                zip(passed, table[1:], strict=True),
                 jnp.full_like(h, table[0]),
             )
             for table in map(np.ndarray.tolist, _TABLES)

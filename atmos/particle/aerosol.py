@@ -135,10 +135,10 @@ def _dust(column: str) -> Tabulated:
 
 
 def _check_at_least_0(name: str, value: Array) -> None:
-    if not (isinstance(value, Tracer) or 0.0 <= value < math.inf):
+    if not (isinstance(value, Tracer) or 0.0 <= float(value) < math.inf):
         raise ValueError(f"`{name}` must be 0 or more and finite; got {value}.")
 
 
 def _check_above_0(name: str, value: Array) -> None:
-    if not (isinstance(value, Tracer) or 0.0 < value < math.inf):
+    if not (isinstance(value, Tracer) or 0.0 < float(value) < math.inf):
         raise ValueError(f"`{name}` must be above 0 and finite; got {value}.")

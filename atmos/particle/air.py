@@ -15,7 +15,7 @@ class Air(AbstractGas):
     co2: Number = eqx.field(converter=as_float, default=360e-6)
 
     def __check_init__(self):
-        if not (isinstance(self.co2, Tracer) or 0.0 <= self.co2 <= 1.0):
+        if not (isinstance(self.co2, Tracer) or 0.0 <= float(self.co2) <= 1.0):
             raise ValueError(f"`co2` must lie between 0 and 1; got {self.co2}.")
 
     def refractivity(self, wavelength: Wavelength) -> Spectral:

@@ -61,7 +61,7 @@ class Scattering(AbstractSpectrum):
 
     def __check_init__(self):
         n = self.number_density
-        if not (isinstance(n, Tracer) or 0.0 <= n < math.inf):
+        if not (isinstance(n, Tracer) or 0.0 <= float(n) < math.inf):
             raise ValueError(f"`number_density` must be 0 m^-3 or more; got {n}.")
 
     def evaluate(self, wavelength: Wavelength) -> Spectral:

@@ -1,5 +1,6 @@
 """A solved scene as a sky, and as a panorama from one place."""
 
+import functools as ft
 import math
 import os
 from concurrent.futures import ThreadPoolExecutor
@@ -12,6 +13,7 @@ import numpy as np
 from jax.core import Tracer
 from jaxtyping import Array, Float, PyTree
 
+from ..geometry import AbstractGeometry
 from ..light import Sun
 from ..phase import Isotropic
 from ..polarisation import vibration
@@ -100,16 +102,19 @@ class SolvedSky(AbstractSky):
         not hold for what one sees. Where the place, the sun, or the size of the world
         are traced, it is as fine as any of them might ask for.
         """
-        if not isinstance(position, Tracer) and np.any(np.asarray(position)[:2] != 0.0):
-            raise ValueError(
-                f"`position` must lie straight above the origin; got {position}."
-            )
+        altitude = math.inf
+        if not isinstance(position, Tracer):
+            *aside, altitude = np.asarray(position).tolist()
+            if any(aside):
+                raise ValueError(
+                    f"`position` must lie straight above the origin; got {position}."
+                )
         with jax.ensure_compile_time_eval():  # what is not traced stays known
-            dip, _ = self._edges(position[2])
-            lowest = max((_known(x.zenith + dip) for x in self.scene.suns), default=0.0)
+            towards = [x.direction for x in self.scene.suns]
+            lowest = _known(_lowest(self.scene.geometry, position, towards))
             if math.isfinite(lowest):
                 self.solver.check_panorama(self.scene, lowest)
-            size = fine_enough(_known(position[2]), lowest, self.solver.around)
+            size = fine_enough(altitude, lowest, self.solver.around)
         return _tabulate(self, position, size)
 
     @property
@@ -146,6 +151,20 @@ def _known(x: Number) -> float:
     return math.inf if isinstance(x, Tracer) else float(x)
 
 
+@eqx.filter_jit
+def _lowest(
+    geometry: AbstractGeometry, position: Position, towards: list[Direction]
+) -> Angle:
+    """The zenith angle of the lowest light, as it is where the horizon is."""
+    _, _, altitude = position
+    dip = geometry.dip(altitude, 0.0 * altitude)
+    zeniths = [
+        jnp.arctan2(jnp.sqrt(east * east + north * north), up)
+        for east, north, up in towards
+    ]
+    return ft.reduce(jnp.maximum, [x + dip for x in zeniths], 0.0 * dip)
+
+
 # So far from straight up, in rad, single precision still knows the azimuth.
 _SLIVER = 1e-6
 # How many azimuths, at most, and rings are looked at together: grids of all sizes share
@@ -156,35 +175,27 @@ _RINGS, _RINGS_ON_CPU = 80, 8
 
 def _tabulate(sky: SolvedSky, position: Position, resolution: Resolution) -> Panorama:
     """The sky on a grid of directions, one light after the other."""
-    grid, phases, sides, zenith, azimuth = _frame(sky, position, resolution)
-    rings, around = resolution.above + resolution.below, resolution.around
-    every = resolution.every if around <= _AROUND else 1
+    grid, phases, sides, blocks = _frame(sky, position, resolution)
+    every = resolution.every if resolution.around <= _AROUND else 1
 
-    def table(light):
-        look = lambda x, y: _looks(sky, light, position, x, y, every)
+    def seen(light):
+        look = lambda x: _looks(sky, light, position, x[0], x[1], every)
         if any(isinstance(x, Tracer) for x in jax.tree.leaves((sky, position))):
             # A gradient would else keep every place on every ray.
-            block = jax.checkpoint(look)
-            along = lambda y: jax.lax.map(lambda x: block(x, y), zenith)
-            found = jax.lax.map(along, azimuth)
-        else:
-            blocks = [(x, y) for y in azimuth for x in zenith]
-            # The first compiles what the others, on as many cores as there are, use.
-            first = look(*blocks[0])
-            with ThreadPoolExecutor(os.cpu_count()) as pool:
-                rest = pool.map(lambda x: look(*x), blocks[1:])
-                found = jnp.stack([first, *rest])
-            found = found.reshape(len(azimuth), len(zenith), *found.shape[1:])
-        found = jnp.moveaxis(found, 0, 2)
-        found = found.reshape(zenith.size, azimuth.size, *found.shape[4:])
-        return found[:rings, :around]
+            return jax.lax.map(jax.checkpoint(look), blocks)
+        each = list(zip(*(np.asarray(x) for x in blocks), strict=True))
+        # The first compiles what the others, on as many cores as there are, use.
+        first = look(each[0])
+        with ThreadPoolExecutor(os.cpu_count()) as pool:
+            return [first, *pool.map(look, each[1:])]
 
-    tables = [table(x) for x in sky.scene.suns]
-    parts = len(phases) + sky.solver.stokes
-    none = jnp.zeros((0, rings, around, parts, sky.wavelength.size), zenith.dtype)
+    tables = [seen(x) for x in sky.scene.suns]
+    rings, parts = resolution.above + resolution.below, len(phases) + sky.solver.stokes
+    empty = 0, rings, resolution.around, parts, sky.wavelength.size
+    none = lambda: jnp.zeros(empty, sky.wavelength.dtype)
     return Panorama(
         grid=grid,
-        table=jnp.stack(tables) if tables else none,
+        table=_joined(tables, resolution) if tables else none(),
         light_zenith=sides[0],
         light_azimuth=sides[1],
         phases=phases,
@@ -196,23 +207,48 @@ def _tabulate(sky: SolvedSky, position: Position, resolution: Resolution) -> Pan
 def _frame(
     sky: SolvedSky, position: Position, resolution: Resolution
 ) -> tuple[Any, ...]:
-    """The grid, the phase functions to put on, where the lights stand; directions."""
+    """The grid, the phase functions to put on, where the lights stand; blocks of rings
+    and azimuths."""
     dip, first = sky._edges(position[2])
     grid = Grid(first, 0.5 * math.pi + dip, resolution)
     on_cpu = jax.default_backend() == "cpu"
-    blocks = [
+    zenith, azimuth = (
         jnp.pad(x, (0, -x.size % size), mode="edge").reshape(-1, size)
         for x, size in (
             (grid.zeniths(), _RINGS_ON_CPU if on_cpu else _RINGS),
             (grid.azimuths(), min(resolution.around, _AROUND)),
         )
-    ]
+    )
+    blocks = (
+        jnp.tile(zenith, (len(azimuth), 1)),
+        jnp.repeat(azimuth, len(zenith), 0),
+    )
     terms = [x.phase.terms(sky.wavelength) for x in sky.scene.scattering_media]
     phases = [x for mixture in terms for x, _ in mixture]
     phases = [x for x in phases if not isinstance(x, Isotropic)]
     lights = sky.scene.suns
     sides = [[x.zenith for x in lights], [x.azimuth for x in lights]]
-    return grid, tuple(phases), jnp.array(sides, dip.dtype), *blocks
+    sides = tuple(jnp.array(x, dip.dtype) for x in sides)
+    return grid, tuple(phases), sides, blocks
+
+
+@eqx.filter_jit
+def _joined(
+    tables: list[Any], resolution: Resolution
+) -> Float[Array, "light ring around part wl"]:
+    """The blocks of each light as one table."""
+    rings, around = resolution.above + resolution.below, resolution.around
+
+    def joined(blocks):
+        found = jnp.asarray(blocks)
+        size = found.shape[2]
+        found = found.reshape(-(-around // size), -1, *found.shape[1:])
+        found = jnp.moveaxis(found, 0, 2)
+        rows, each, columns = found.shape[:3]
+        found = found.reshape(rows * each, columns * size, *found.shape[4:])
+        return found[:rings, :around]
+
+    return jnp.stack([joined(x) for x in tables])
 
 
 @eqx.filter_jit
