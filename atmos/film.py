@@ -34,7 +34,8 @@ class Film:
     """What has been seen through a camera so far: one tally for each stretch of pixels.
 
     Stretches are alike in size; the last is filled up with the last pixel. One after
-    the other is looked at, and after the last the first again.
+    the other is looked at, and after the last the first again. Tallies have a channel
+    more than the picture, for what comes late.
     """
 
     camera: AbstractCamera
@@ -51,7 +52,7 @@ class Film:
         most = _RAYS_ON_CPU if jax.default_backend() == "cpu" else _RAYS
         stretches = -(-count // most)
         channels = sky.wavelength.size if response is None else response.shape[1]
-        dark = jnp.zeros((-(-count // stretches), channels), dtype)
+        dark = jnp.zeros((-(-count // stretches), channels + 1), dtype)
         none = Tally(jnp.zeros((), dtype), dark, dark)
         return cls(camera, (none,) * stretches)
 
@@ -67,12 +68,22 @@ class Film:
 
     def mean(self) -> Float[np.ndarray, "height width channel"]:
         """The picture: black where nothing has been seen yet."""
-        return self._laid_out([np.asarray(x.mean) for x in self.tallies])
+        return self._laid_out([np.asarray(x.mean)[:, :-1] for x in self.tallies])
+
+    @property
+    def late(self) -> float:
+        """What share of even light comes by paths that were ended for their length.
+
+        On average over the pixels. Such light is seldom found, and then bright.
+        """
+        return float(
+            np.mean([np.mean(np.asarray(x.mean)[:, -1]) for x in self.tallies])
+        )
 
     def variance(self) -> Float[np.ndarray, "height width channel"]:
         """The square of the standard error; NaN before the second look."""
         with np.errstate(invalid="ignore", divide="ignore"):
-            return self._laid_out([_variance(x) for x in self.tallies])
+            return self._laid_out([_variance(x)[:, :-1] for x in self.tallies])
 
     def error(self) -> float:
         """How far the picture is likely to be off, relative: a standard error.
@@ -156,7 +167,7 @@ def _look(
     pixels: Int[Array, "pixel"],
     index: Integer[Scalar, ""],
     response: Response | None,
-) -> Float[Array, "pixel channel"]:
+) -> Float[Array, "pixel number"]:
     dtype = sky.wavelength.dtype
     key = jax.random.fold_in(jax.random.key(0), index)
 
@@ -170,12 +181,14 @@ def _look(
     solver = _shuffled(sky.solver, index, pixels[0])
     anew = dataclasses.replace(sky, solver=solver)
     if isinstance(solver, AbstractTracing):
-        seen = estimates(anew, positions, directions).mean
+        found = estimates(anew, positions, directions)
+        seen, late = found.mean, found.late
     else:
         seen = jax.vmap(anew.radiance)(positions, directions)
+        late = jnp.zeros_like(seen[:, 0])
     if response is not None:
         seen = jnp.matmul(seen, response, precision="highest")
-    return seen
+    return jnp.concatenate([seen, late[:, None]], 1)
 
 
 def _shuffled(solver: AbstractSolver, *numbers: Integer[Scalar, ""]) -> AbstractSolver:

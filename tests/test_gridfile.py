@@ -128,10 +128,27 @@ def test_values_below_0_are_refused_saying_where(written, tmp_path):
     np.savez(path, x=np.full((1, 2, 2), np.nan), lower=np.zeros(3), upper=np.ones(3))
     with pytest.raises(ValueError, match=r"a.npz: .*values\[0, 0, 0\] = nan"):
         gridfile.load(path, "x")
-    with pytest.raises(ValueError, match="must be one of x, lower, upper; got 'y'"):
+    with pytest.raises(ValueError, match="must be one of x; got 'y'"):
         gridfile.load(path, "y")
     with pytest.raises(ValueError, match="must be in a .vdb or .npz file"):
         gridfile.load(tmp_path / "a.txt", "x")
+
+
+ONES, LOW, HIGH = np.ones((2, 2, 2)), np.zeros(3), np.ones(3)
+POOR = [
+    ({"x": ONES, "upper": HIGH}, "must stand beside `lower`, which is missing"),
+    ({"x": ONES, "lower": HIGH, "upper": LOW}, "must have `lower` below `upper`; got"),
+    ({"x": 1j * ONES, "lower": LOW, "upper": HIGH}, "real numbers in `x`; got complex"),
+    ({"x": np.array([{}]), "lower": LOW, "upper": HIGH}, "in `x`; got objects"),
+    ({"x": ONES[:0], "lower": LOW, "upper": HIGH}, "must have one cell or more"),
+]
+
+
+@pytest.mark.parametrize("arrays, message", POOR)
+def test_an_archive_that_holds_no_grid_is_refused(arrays, message, tmp_path):
+    np.savez(tmp_path / "a.npz", **arrays)
+    with pytest.raises(ValueError, match=f"a.npz: `x` .*{message}"):
+        gridfile.load(tmp_path / "a.npz", "x")
 
 
 @pytest.mark.parametrize("name", ["float", "zip", "tiles"])

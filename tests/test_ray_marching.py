@@ -95,7 +95,7 @@ def crossing(position, direction):
     return enter, max(ends[1].min(), enter)
 
 
-def due_in_box(position, direction, count=200_000):
+def due_in_box(position, direction, count=200_000, g=0.4):
     """Light that turned once in it, by the exact lengths to the sun; by midpoints."""
     enter, leave = crossing(position, direction)
     s = enter + (leave - enter) * (np.arange(count) + 0.5) / count
@@ -104,7 +104,7 @@ def due_in_box(position, direction, count=200_000):
     scattering = 0.8 * 550.0 / NM
     passed = (s - enter + to_sun)[:, None] * (scattering + 0.3)
     cosine = direction @ SLANT
-    lobe = (1 - 0.16) / (4 * np.pi * (1 + 0.16 - 0.8 * cosine) ** 1.5)
+    lobe = (1 - g * g) / (4 * np.pi * (1 + g * g - 2 * g * cosine) ** 1.5)
     return 2.0 * lobe * scattering * np.mean(np.exp(-passed), 0) * (leave - enter)
 
 
@@ -120,6 +120,19 @@ def test_light_in_a_homogeneous_box_is_its_closed_form():
     lobe = (1 - 0.16) / (4 * np.pi * (1 + 0.16) ** 1.5)
     due = 2.0 * lobe * scattering * np.exp(-1.5 * k) * -np.expm1(-2.0 * k) / k
     np.testing.assert_allclose(found, due, rtol=1e-12)
+
+
+@pytest.mark.parametrize("g", [-0.999, 0.999])
+def test_it_is_so_within_smoke_and_however_sharp_its_lobe_is(g):
+    # Towards the sun, away from it, near both, and aside.
+    smoke = dataclasses.replace(BOX, phase=HenyeyGreenstein(g))
+    inside = rng.uniform(0.8 * LOWER + 0.2 * UPPER, 0.2 * LOWER + 0.8 * UPPER, (5, 3))
+    aim = np.stack([SLANT, -SLANT, SLANT + 0.01 * ABOVE, 0.01 * ABOVE - SLANT, ABOVE])
+    aim = (aim + 1e-9) / np.linalg.norm(aim + 1e-9, axis=1)[:, None]
+    found = seen(scene(smoke, sun=SLANT), MARCH, inside, aim)
+    due = np.array([due_in_box(*x, 20_000, g) for x in zip(inside, aim, strict=True)])
+    np.testing.assert_allclose(found, due, rtol=1e-4)
+    assert np.max(due) > 1e6 * np.min(due)
 
 
 def test_a_box_looks_alike_however_it_is_said():

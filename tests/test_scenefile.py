@@ -461,6 +461,13 @@ BAD = [
     ("8000.0", "-8000.0", "`medium[0].profile.scale_height`", "above 0; got -8000.0"),
     ("8000.0", "0", "`medium[0].profile.scale_height`", "above 0; got 0"),
     (PROFILE, "3", "`medium[0].profile` must be a table", "got 3"),
+    (
+        PROFILE,
+        '{ kind = "grid", values = [[[1], [2, 3]]], lower = [0, 0, 0], '
+        "upper = [1, 1, 1] }",
+        "`medium[0].profile.values` must have as many",
+        "got [1, 2]",
+    ),
     ('"exponential"', '"cone"', "`medium[0].profile.kind` must be one", "got 'cone'"),
     (
         "top = 1200",

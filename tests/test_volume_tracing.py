@@ -49,19 +49,24 @@ def cloud(profile, scattering, absorption, g, sun=SLANT, exponent=0.0):
     return Scene(Flat(), 1e8, (medium,), (Sun(sun, 1.0, 0.0),))
 
 
-def tallied(scene, positions, directions, solver=SOLVER):
-    """Means and standard errors, always of so many looks that tests share compilations.
+def glimpsed(scene, positions, directions, solver=SOLVER):
+    """Always of so many looks that tests share compilations.
 
     In single precision, as pictures are made.
     """
     sky = solve(scene, solver, jnp.asarray(NM, jnp.float32))
-    repeat = LOOKS // len(positions)
-    looks = [np.repeat(x, repeat, 0) for x in (positions, directions)]
+    looks = [np.repeat(x, LOOKS // len(x), 0) for x in (positions, directions)]
     # No two looks are alike, or they would be alike in all that is random too.
     looks[0] = looks[0] * (1.0 + 1e-6 * rng.uniform(-1.0, 1.0, (LOOKS, 1)))
     looks = [jnp.asarray(x, jnp.float32) for x in looks]
     more = sky.prepared, sky.scene, sky.scene.lights[0], sky.wavelength
-    found = sky.solver.tally(*more, *looks)
+    return sky.solver.tally(*more, *looks)
+
+
+def tallied(scene, positions, directions, solver=SOLVER):
+    """Means and standard errors."""
+    found = glimpsed(scene, positions, directions, solver)
+    repeat = LOOKS // len(positions)
     parts = lambda x: np.asarray(x, float).reshape(-1, repeat, len(NM))
     error = np.sqrt(np.mean(parts(found.standard_error) ** 2, 1) / repeat)
     return np.mean(parts(found.mean), 1), error
@@ -299,10 +304,20 @@ def test_strong_colours_keep_their_variance():
     assert np.all(np.isfinite(mean)) and np.all(error < mean)
 
 
-def test_light_that_is_never_absorbed_comes_to_an_end():
-    mean, _ = tallied(cloud(BOX, 500.0, 0.0, 0.0), START[3:], AIM[3:])
+def test_light_that_is_never_absorbed_comes_to_an_end_and_says_what_was_ended():
+    found = glimpsed(cloud(BOX, 500.0, 0.0, 0.0), START[3:], AIM[3:])
     # A white wall, lit from above: no brighter than white in full light.
+    mean = np.mean(found.mean, 0)
     assert np.all((mean > 0.0) & (mean < 1.0 / np.pi))
+    # In half of all space so much is not out after n turns, on average over where it
+    # came from (Sparre Andersen 1954), and H / 2 times as much of what came this way
+    # (Chandrasekhar 1950, table 11).
+    due = 2.8653 / np.sqrt(np.pi * SOLVER.turns)
+    late = np.asarray(found.late, float)
+    error = np.std(late, ddof=1) / np.sqrt(LOOKS)
+    assert abs(np.mean(late) - due) < 4.5 * error < 0.6 * due
+    # Where it is thin or dark there is no such light.
+    assert np.all(np.asarray(glimpsed(cloud(BOX, 1.0, 0.2, 0.4), START, AIM).late) == 0)
 
 
 @jax.jit

@@ -1,5 +1,6 @@
 """A picture on its way: taken up, gone on with, and kept now and then."""
 
+import sys
 import time
 from pathlib import Path
 
@@ -16,6 +17,10 @@ from ._write import Seen
 
 
 _EVERY = 60.0  # seconds between two checkpoints
+_LATE = (
+    "atmos: paths of very many turns were ended by chance; by them would come {:.2g} "
+    "of the light, were it even all around: it is seldom found, and then bright"
+)
 
 
 class Work:
@@ -37,9 +42,12 @@ class Work:
         assert isinstance(sky, SolvedSky)
         film, seconds = self._seen(sky, camera, response)
         layers = {}
+        if film.late > 0.0:
+            print(_LATE.format(film.late), file=sys.stderr)
         said: dict[str, Attribute] = {
             "samples": round(film.looks * self.each),
             "seconds": round(seconds, 3),
+            "lateShare": film.late,
         }
         if film.looks >= 2.0:
             layers["variance"] = film.variance()

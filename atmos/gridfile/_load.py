@@ -5,6 +5,7 @@ from collections.abc import Iterator
 
 import numpy as np
 from jaxtyping import ArrayLike
+from numpy.lib.npyio import NpzFile
 
 from ..medium import AbstractProfile, coloured, Medium
 from ..phase import AbstractPhaseFunction
@@ -95,18 +96,39 @@ def _find(name: str, known: list[str]) -> None:
 def _of_npz(path: str, names: list[str]) -> list[Volume]:
     try:
         with np.load(path, allow_pickle=False) as archive:
-            for name in [*names, "lower", "upper"]:
-                _find(name, list(archive))
-            arrays = [np.asarray(archive[x], np.float32) for x in names]
-            lower, upper = (np.asarray(archive[x], float) for x in ("lower", "upper"))
+            grids = [x for x in archive if x not in _CORNERS]
+            for name in names:
+                _find(name, grids)
+            for corner in _CORNERS:
+                if corner not in archive:
+                    raise ValueError(f"must stand beside `{corner}`, which is missing")
+            arrays = [_numbers(archive, x) for x in names]
+            lower, upper = (_numbers(archive, x).astype(float) for x in _CORNERS)
     except zipfile.BadZipFile as error:
         raise ValueError("is cut short or damaged") from error
     if lower.shape != (3,) or upper.shape != (3,):
         raise ValueError("must have `lower` and `upper` of 3 numbers each")
+    if not (np.all(np.isfinite(upper - lower)) and np.all(upper > lower)):
+        corners = f"{lower.tolist()} and {upper.tolist()}"
+        raise ValueError(f"must have `lower` below `upper`; got {corners}")
     volumes = []
     for values in arrays:
         if values.ndim not in (3, 4):
             raise ValueError(f"must have 3 or 4 axes; got shape {values.shape}")
         size = (upper - lower) / np.maximum(values.shape[:3], 1)
-        volumes.append(Volume(values, (0, 0, 0), np.diag(size), lower + 0.5 * size))
+        place = np.diag(size), lower + 0.5 * size
+        volumes.append(Volume(values.astype(np.float32), (0, 0, 0), *place))
     return volumes
+
+
+_CORNERS = "lower", "upper"
+
+
+def _numbers(archive: NpzFile, name: str) -> np.ndarray:
+    try:
+        found = archive[name]
+    except ValueError as error:  # of objects, which are not read
+        raise ValueError(f"must have numbers in `{name}`; got objects") from error
+    if found.dtype.kind not in "buif":
+        raise ValueError(f"must have real numbers in `{name}`; got {found.dtype}")
+    return found

@@ -12,7 +12,7 @@ import numpy as np
 
 from .. import gridfile, medium
 from ._base import Above0, AtLeast0, build, Kind
-from ._errors import under
+from ._errors import refuse, under
 
 
 # Where files that a scene names are looked for.
@@ -97,6 +97,15 @@ class Grid(Kind, tag="grid"):
     values: list[list[list[AtLeast0]]]
     lower: Place
     upper: Place
+
+    def build(self) -> medium.Grid:
+        columns = {len(x) for x in self.values}
+        rows = {len(y) for x in self.values for y in x}
+        for lengths in (columns, rows):
+            if len(lengths) > 1:
+                rule = "must have as many numbers in each row as in others"
+                refuse("values", rule, sorted(lengths))
+        return super().build()
 
 
 @contextlib.contextmanager

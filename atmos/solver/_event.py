@@ -70,6 +70,8 @@ def proceed(quest: Quest, trip: Trip) -> Trip:
     promise = stop_gradient(jnp.mean(weight) * bend.promise)
     stays = jnp.clip(promise / _FAINT, 0.05, 1.0)
     often = order > quest.turns
+    now = bend.turns & (order == quest.turns)
+    late = jnp.where(now, stop_gradient(jnp.mean(weight)), trip.late)
     stays = jnp.where(often, jnp.minimum(stays, 1.0 - 10.0 / quest.turns), stays)
     stays = jnp.where(bend.turns, stays, 1.0)
     weight = jnp.where(u[7] < stays, weight / stays, 0.0)
@@ -106,6 +108,7 @@ def proceed(quest: Quest, trip: Trip) -> Trip:
         beam=beam,
         bright=jnp.where(sets_out, jnp.max(beam, initial=0.0), trip.bright),
         total=found,
+        late=late,
     )
 
 

@@ -36,11 +36,11 @@ class Lanes(eqx.Module):
     next: Integer[Array, ""]
     done: Integer[Array, ""]
     which: Integer[Array, "room"]
-    found: Float[Array, "room wl"]
+    found: Float[Array, "room number"]
 
 
-def followed(start: Start, onwards: Onwards, count: int) -> Float[Array, "path wl"]:
-    """What so many paths find, each from its start to its end."""
+def followed(start: Start, onwards: Onwards, count: int) -> Float[Array, "path number"]:
+    """What so many paths find, each from its start to its end, and their `late`."""
     most = _LANES_ON_CPU if jax.default_backend() == "cpu" else _LANES
     size = min(most, -(-count // _EACH))
     fewer = size // _FEWER if size == most else 0
@@ -52,7 +52,9 @@ def followed(start: Start, onwards: Onwards, count: int) -> Float[Array, "path w
         next=jnp.int32(size),
         done=jnp.int32(0),
         which=jnp.zeros(count + size, jnp.int32),
-        found=jnp.zeros_like(trips.total, shape=(count + size, trips.total.shape[1])),
+        found=jnp.zeros_like(
+            trips.total, shape=(count + size, trips.total.shape[1] + 1)
+        ),
     )
     walk = lambda x: _walked(x, start, onwards, count)
     going = lambda x: (x.next < count) | (jnp.sum(x.whose < count) > fewer)
@@ -83,13 +85,14 @@ def _walked(lanes: Lanes, start: Start, onwards: Onwards, count: int) -> Lanes:
     new = ended & (number < count)
     fresh = _turned(jax.vmap(start)(jnp.minimum(number, count - 1)), 0, -1)
     choose = lambda a, b: jnp.where(jnp.broadcast_to(new, a.shape), a, b)
+    found = jnp.concatenate([trips.total, trips.late[None]]).T
     return Lanes(
         trips=jax.tree.map(choose, fresh, trips),
         whose=jnp.where(ended, jnp.where(new, number, count), lanes.whose),
         next=jnp.minimum(lanes.next + upto[-1], count),
         done=lanes.done + upto[-1],
         which=write(lanes.which, lanes.whose[those], lanes.done, 0),
-        found=write(lanes.found, trips.total.T[those], lanes.done, 0),
+        found=write(lanes.found, found[those], lanes.done, 0),
     )
 
 

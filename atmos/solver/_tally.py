@@ -19,12 +19,14 @@ from .single_scattering import SingleScattering
 class Tally(eqx.Module):
     """The mean of independent trials, and how much they scatter about it.
 
-    `squares` is the sum of the squared distances from the mean.
+    `squares` is the sum of the squared distances from the mean. Of even light, what
+    comes `late` comes by paths that were so long that they were ended by chance.
     """
 
     count: Number
     mean: Float[Array, "*batch wl"]
     squares: Float[Array, "*batch wl"]
+    late: Float[Array, "*batch"] | float = 0.0
 
     @classmethod
     def of(cls, trials: Float[Array, "trial *batch wl"]) -> "Tally":
@@ -88,10 +90,11 @@ class AbstractTracing(AbstractSolver):
 
 
 class Estimate(eqx.Module):
-    """A radiance, and how far it is likely to be off."""
+    """A radiance, how far it is likely to be off, and what comes `late` (`Tally`)."""
 
     mean: Float[Array, "*look wl"]
     standard_error: Float[Array, "*look wl"]
+    late: Float[Array, "*look"]
 
 
 @eqx.filter_jit
@@ -115,7 +118,7 @@ def estimates(
     if not isinstance(solver, AbstractTracing):
         raise ValueError(f"`sky` must be traced by paths; got {type(solver).__name__}.")
     total = jnp.zeros((*positions.shape[:1], *sky.wavelength.shape), directions.dtype)
-    mean, variance = total, total
+    mean, variance, late = total, total, total[:, 0]
     lights: list[AbstractLight | None] = list(sky.scene.lights)
     if any(x.emission is not None for x in sky.scene.media):
         lights.append(None)
@@ -130,6 +133,7 @@ def estimates(
         )
         mean += tally.mean
         variance += tally.standard_error**2
+        late += tally.late / len(lights)
     if solver.single is not None:
         once = SolvedSky(
             scene=sky.scene,
@@ -138,4 +142,4 @@ def estimates(
             prepared=None,
         )
         mean += jax.vmap(once.radiance)(positions, directions)
-    return Estimate(mean, jnp.sqrt(variance))
+    return Estimate(mean, jnp.sqrt(variance), late)

@@ -64,6 +64,7 @@ class Trip(eqx.Module):
     brightness `bright` to begin with, and `onward` where the path goes on to after it.
     `aim` is the density, per sr, with which it was sent there. On the first leg layered
     air is met `lift` times as often as it has to be, and turns no less than `least`.
+    `late` is what it weighed when it had turned as often as is gone on with for sure.
     """
 
     lift: Number
@@ -81,6 +82,7 @@ class Trip(eqx.Module):
     beam: Float[Array, "wl"]
     bright: Number
     total: Float[Array, "wl"]
+    late: Number
 
     @property
     def ended(self) -> Bool[Array, ""]:
@@ -121,6 +123,7 @@ def begin(
         beam=0.0 * one,
         bright=jnp.zeros_like(leg.at),
         total=0.0 * one,
+        late=jnp.zeros_like(leg.at),
     )
 
 

@@ -39,8 +39,9 @@ class VolumeTracing(AbstractTracing):
     the look. What shines lights all around it. `check` raises `ValueError` for a medium
     that lies in no box and does not depend on altitude alone. Where nothing is absorbed
     a path of more than `turns` turns is ended by chance, ten in `turns` at each: those
-    that go on weigh more, which makes up for it on average, but is rarely seen. White
-    stuff of an optical depth of 100 that scatters to all sides has few such paths.
+    that go on weigh more, which makes up for it on average, but is rarely seen. What
+    share of the light of even surroundings comes by such paths is `late` in the tally.
+    White stuff of an optical depth of 100 that scatters to all sides has few of them.
 
     Gradients of the mean by forward mode (`jax.jvp`, `jax.jacfwd`) are unbiased for how
     much media scatter, absorb and shine, and where to, and for what the ground and the
@@ -196,5 +197,7 @@ def _tally(
         found = followed(start, onwards, math.prod(each))
         return jnp.mean(found.reshape(*each, -1), 1)
 
-    shape = (*positions.shape[:1], *quest.wavelength.shape)
-    return joined(trials, first, blocks, jnp.zeros(shape, directions.dtype))
+    shape = (*positions.shape[:1], quest.wavelength.shape[0] + 1)
+    found = joined(trials, first, blocks, jnp.zeros(shape, directions.dtype))
+    mean, squares = found.mean[:, :-1], found.squares[:, :-1]
+    return Tally(found.count, mean, squares, found.mean[:, -1])
