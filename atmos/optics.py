@@ -38,6 +38,16 @@ class Mixture(eqx.Module):
         lost = jnp.where(polarises, peak[:, None, None], 0.0) * kept[None, :, :, None]
         return Mixture(self.extinction - peak, smooth, self.polarised - lost)
 
+    def towards(self, finer: "Mixture", share: Float[Array, "wl"]) -> "Mixture":
+        """So much of the same with more moments, that is with less of a peak gone."""
+        more = finer.scattering.shape[1] - self.scattering.shape[1]
+        scattering = jnp.pad(self.scattering, ((0, 0), (0, more), (0, 0)))
+        same = Mixture(self.extinction, scattering, self.polarised)
+        mix = lambda x, y: (
+            x + share.reshape((1,) * (x.ndim - 1) + share.shape) * (y - x)
+        )
+        return jax.tree.map(mix, same, finer)
+
 
 def mixture(
     scene: Scene, wavelength: Wavelength, moments: int, stokes: int = 1

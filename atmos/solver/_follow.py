@@ -23,6 +23,16 @@ from ._ordinates import Diffuse
 _THICK = 0.5
 
 
+def thin(
+    depth: Float[Array, "layer wl"], slant: Float[Array, "level sun wl"]
+) -> Float[Array, "sun wl"]:
+    """From 1 where all layers are thin to 0 where any is thick."""
+    thickest = jnp.max(jnp.diff(slant, axis=0), 0)
+    thickest = jnp.maximum(thickest, jnp.max(depth, 0)[None])
+    # Of four times that nothing is left, and its slope is none.
+    return jnp.exp(-(jnp.minimum(thickest / _THICK, 4.0) ** 4))
+
+
 def follow(
     light: Diffuse,
     depth: Float[Array, "layer wl"],
@@ -31,6 +41,7 @@ def follow(
     passed: Float[Array, "level sun wl"],
     cosine: Float[Array, "sun"],
     polarised: Float[Array, "layer k 3 wl"],
+    share: Float[Array, "sun wl"],
     *,
     nodes: int,
 ) -> tuple[Diffuse, Float[Array, "sun wl"]]:
@@ -40,7 +51,8 @@ def follow(
     which `light` has fewer. `slant` is the optical depth along the beam to each level;
     `passed` is less, what the ordinates took from it. The rest, light that went on in
     peaks that are resolved here, is diffuse. `nodes` are the directions to either side.
-    Of light that is `polarised` Q and U stay what they were.
+    Of light that is `polarised` Q and U stay what they were. So much as `share` is
+    followed, of `thin`.
     """
     count, k = scattering.shape[1], polarised.shape[1]
     l, m = pairs(count)
@@ -64,10 +76,6 @@ def follow(
         _source(*turned, x).at[:k, :k].add(_source(*across, x)) for x in both
     )
     found, received = _once_more(top, bottom, depth, ground, nodes)
-    thickest = jnp.max(jnp.diff(slant, axis=0), 0)
-    thickest = jnp.maximum(thickest, jnp.max(depth, 0)[None])
-    # Of four times that nothing is left, and its slope is none.
-    share = jnp.exp(-(jnp.minimum(thickest / _THICK, 4.0) ** 4))
     mix = lambda old, new, share: old + share * (new - old)
     received = mix(down[-1], received, share)
     moments = mix(moments, found, share[None, :, None])

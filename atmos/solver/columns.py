@@ -16,7 +16,7 @@ from ..transport import columns, contract
 from ._base import check_stokes
 from ._diffuse import AbstractDiffuse, Diffused
 from ._field import Field, Ground
-from ._follow import follow
+from ._follow import follow, thin
 from ._interpolated import Chosen, Glow, Interpolated, misfit
 from ._ordinates import solve_column
 from ._peaks import Peaks
@@ -161,16 +161,17 @@ class Columns(AbstractDiffuse):
         lit = arrives(slant) + light.down[-1]
         glow = Glow(light.up[::-1, -1], light.down[::-1, -1], lit[:-1])
 
-        # In the round, peaks that matter near level are no better than flat air is.
-        resolved = self.degrees
-        if flat:
-            resolved = max(resolved, min(2 * resolved, _RESOLVED))
-        peaks = Peaks.of(scene, wavelength, resolved, self.stokes)
-        mixed, passed = peaks.without, slant
-        few = chosen.of_mixture(mixed)
-        slant = slant_of(few.extinction)
+        share, passed = thin(column[0], slant), slant
+        if flat:  # in the round, flatness costs more than peaks that matter near level
+            resolved = max(self.degrees, min(2 * self.degrees, _RESOLVED))
+            fine = Peaks.of(scene, wavelength, resolved, self.stokes).without
+            followed = jnp.clip(chosen.smooth(jnp.min(share, 0)), 0.0, 1.0)
+            mixed = mixed.towards(fine, followed)
+            peaks = dataclasses.replace(peaks, without=mixed)
+            few = chosen.of_mixture(mixed)
+            slant = slant_of(few.extinction)
         column = total(few.extinction), total(few.scattering)
-        more = slant, passed, cosine, total(few.polarised)
+        more = slant, passed, cosine, total(few.polarised), share
         light, sky = follow(light, *column, *more, nodes=self.streams)
         lit = arrives(slant) + sky
         moments = jnp.swapaxes(light.moments[::-1], 1, 2)
