@@ -22,7 +22,7 @@ from ._base import AbstractPanorama
 # Rings keep this far off the horizon, so that rounding leaves no doubt on which side.
 _SLIVER = 1e-5
 # How much finer a grid is that is joined by straight lines; azimuths on it, at least.
-_FINER, _AROUND = 4, 33
+_FINER, _FINEST = 4, 33
 
 
 class Resolution(eqx.Module):
@@ -59,7 +59,7 @@ def fine_enough(altitude: float, lowest: float, around: int) -> Resolution:
     """
     size = next(size for most, size in _ENOUGH if lowest <= most)
     if altitude > _HIGH:
-        size = Resolution(192, 48, 2 * size.around - 1)
+        size = Resolution(192, 48, max(2 * size.around - 1, 17))
     every = max((around - 1) // (size.around - 1), 1)
     around = max(size.around, around)
     every = every if (around - 1) % every == 0 else 1
@@ -313,7 +313,7 @@ class Panorama(AbstractPanorama):
         size = Resolution(
             above=_FINER * (size.above - 1) + 1,
             below=_FINER * (size.below - 1) + 1,
-            around=max(_FINER * (size.around - 1) + 1, _AROUND),
+            around=max(_FINER * (size.around - 1) + 1, _FINEST),
             crowded=size.crowded,
         )
         grid = Grid(self.grid.first, self.grid.horizon, size)

@@ -51,8 +51,9 @@ class Columns(AbstractDiffuse):
 
     Diffuse light is found at `wavelengths` of all wavelengths and drawn out to the
     rest, relative to light that turned once. Where that is left open they are 10 if the
-    air is smooth enough, which leaves 1e-4 of the radiance and nowhere more than 2e-3,
-    and all if it is not, or cannot be known as its numbers are traced.
+    air is smooth enough, which leaves up to 3e-4 of the radiance in the mean and 2e-3
+    in places (7e-3 of diffuse fluxes within the ozone layer), and all if it is not, or
+    cannot be known as its numbers are traced.
 
     With `stokes` 3 the light is polarised, which changes its radiance too.
 
