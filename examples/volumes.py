@@ -8,6 +8,7 @@ import numpy as np
 
 from atmos import colour, deg, image, render, Scene, solve
 from atmos.camera import Perspective
+from atmos.denoise import denoise
 from atmos.geometry import Flat
 from atmos.light import Sun, sunlight
 from atmos.medium import (
@@ -110,13 +111,18 @@ PICTURES = {"beam": beam, "fire": fire, "cloud": cloud}
 
 
 def main(folder, size, cells=128):
-    """Writes the pictures, and all in one, into a folder, and returns their XYZ."""
+    """Writes the pictures, and all in one, into a folder, and returns their XYZ.
+
+    What is traced is shown without its noise.
+    """
     response = colour.response(WAVELENGTH)
     pictures, shown = {}, []
     for name, make in PICTURES.items():
         scene, solver, camera = make(cells)
         sky = solve(scene, solver, WAVELENGTH)
         xyz = pictures[name] = render(sky, camera(size), response)
+        if isinstance(solver, VolumeTracing):
+            xyz = jnp.asarray(denoise(np.asarray(xyz), colour.COLOUR_SPACES["xyz"]))
         shown.append(colour.preview(xyz, colour.automatic_exposure(xyz)))
         image.write_png(folder / f"{name}.png", shown[-1])
     image.write_png(folder / "volumes.png", jnp.concatenate(shown, 1))

@@ -16,10 +16,20 @@ from PIL import Image
 import atmos
 from atmos.camera import Perspective
 from atmos.cli import main, SunPosition
+from atmos.cli._march import March
 from atmos.cli._view import View
 from atmos.colour import COLOUR_SPACES
 from atmos.image import read_exr
 from atmos.scenefile import dump, load, parse
+from atmos.solver import (
+    Adaptive,
+    Fixed,
+    Jittered,
+    RayMarching,
+    ShadowCache,
+    ShadowRays,
+    Skipping,
+)
 
 
 pytestmark = pytest.mark.usefixtures("hasty")
@@ -254,6 +264,18 @@ def test_what_shines_is_marched_along_every_ray(capsys, folder):
     assert "`medium[0].emission` must be None, for this solver" in err
 
 
+def test_options_say_how_rays_are_marched_along():
+    usual = March().solver()
+    assert isinstance(usual.steps, Jittered) and usual.steps.count == 256
+    assert isinstance(usual.shadows, ShadowCache)
+    sharp = March(steps="fixed", step_count=7, shadows="rays").solver()
+    assert sharp == RayMarching(Fixed(7), ShadowRays())
+    assert March(steps="skipping", step_count=9).solver().steps == Skipping(9)
+    exact = March(steps="adaptive", tolerance=0.5).solver().steps
+    assert isinstance(exact, Adaptive)
+    assert (exact.tolerance, exact.count) == (0.5, Adaptive().count)
+
+
 def test_spectral_pictures_hold_the_same_light(capsys):
     sky(capsys, "--no-preview")
     wanted = read_exr("sky.exr").stack("R", "G", "B")
@@ -462,6 +484,12 @@ BAD = [
     ("sky dark.toml --sun-elevation 9", "sun", "alone to be moved; got 0"),
     ("sky ball.toml", "ball.toml: `surface` must be empty", "got 1"),
     ("render lamp.toml --solver march", "lamp.toml: `light[0]` must be", "got Lamp"),
+    ("render thin.toml --steps fixed", "--steps", "for --solver march"),
+    ("render thin.toml --step-count 9", "--step-count", "for --solver march"),
+    ("render thin.toml --solver march --step-count 0", "--step-count", "from 1 to"),
+    ("render thin.toml --solver march --tolerance 1", "--tolerance", "adaptive"),
+    ("render thin.toml --solver march --steps skipping", "medium[0]", "in a box"),
+    ("render thin.toml --wavelength 550", "--wavelength", "two or more"),
 ]
 
 

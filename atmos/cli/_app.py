@@ -13,16 +13,17 @@ _MOST_NUMBERS = 10**6
 HIGHEST = 1e9
 SIGNED = {"allow_leading_hyphen": True}
 STOP = Group("Until", sort_key=0)
-WORLD = Group("World", sort_key=1)
-SUN = Group("Sun", sort_key=2)
-MODEL = Group("Fitted sky", sort_key=3)
-CAMERA = Group("Camera", sort_key=4)
-OUTPUT = Group("Output", sort_key=5)
+MARCH = Group("With --solver march", sort_key=1)
+WORLD = Group("World", sort_key=2)
+SUN = Group("Sun", sort_key=3)
+MODEL = Group("Fitted sky", sort_key=4)
+CAMERA = Group("Camera", sort_key=5)
+OUTPUT = Group("Output", sort_key=6)
 app = App(
     name="atmos",
     help="A physically based sky: pictures, radiances, optical depths.",
     version=lambda: importlib.metadata.version("atmos"),
-    help_format="plaintext",
+    help_format="markdown",
     result_action="return_value",
     suppress_keyboard_interrupt=False,
 )

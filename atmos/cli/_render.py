@@ -9,9 +9,9 @@ import numpy as np
 
 from ..denoise import denoiser
 from ..scenefile import load_camera
-from ..solver import AbstractSolver, Jittered, RayMarching, ShadowCache
-from ._app import app, CAMERA, flat, option, OUTPUT, refuse, STOP, SUN
+from ._app import app, CAMERA, flat, MARCH, option, OUTPUT, refuse, STOP, SUN
 from ._lamp import described
+from ._march import March
 from ._model import Model
 from ._options import check_output, File, Files, observed, SunPosition, World
 from ._session import start
@@ -35,6 +35,7 @@ def render(
         ),
     ] = "trace",
     stop: Annotated[Stop | None, flat(STOP)] = None,
+    march: Annotated[March | None, flat(MARCH)] = None,
     sun: Annotated[SunPosition | None, flat(SUN)] = None,
     view: Annotated[View | None, flat(CAMERA)] = None,
     files: Annotated[Files | None, flat(OUTPUT)] = None,
@@ -63,9 +64,12 @@ def render(
     atmos render cloud.toml --error 0.02 --time 600 --wavelength 400:700:50
 
     atmos render fire.toml --samples 64 --denoise --azimuth 90 --position -6,0,1.7
+
+    atmos render smoke.toml --solver march --steps adaptive --tolerance 0.01 --samples 4
     """
     stop, sun, view = stop or Stop(), sun or SunPosition(), view or View()
-    files = files or Files()
+    files, march = files or Files(), march or March()
+    march.check(solver)
     paths = files.check(scene.stem)
     kept = paths[0].with_name(f"{paths[0].name}.checkpoint")
     check_output("--output", kept)
@@ -79,7 +83,7 @@ def render(
     camera = view.camera(load_camera(scene))
     step = (wavelength[-1] - wavelength[0]) / max(1, wavelength.size - 1) or 10.0
     found = make_scene(scene, World(), sun, float(step))
-    method = _march() if solver == "march" else tracer(found)
+    method = march.solver() if solver == "march" else tracer(found)
     solved = lambda: solve_file(found, method, wavelength, scene)
     said = {"solver": str(method)} | observed(sun, camera) | described(found, camera)
     work = Work(stop, kept, EACH if solver == "trace" else 1)
@@ -89,7 +93,3 @@ def render(
         raise KeyboardInterrupt
     with contextlib.suppress(FileNotFoundError):
         os.unlink(kept)
-
-
-def _march() -> AbstractSolver:
-    return RayMarching(Jittered(256), ShadowCache(96))

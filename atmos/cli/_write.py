@@ -17,6 +17,7 @@ from ..sky import AbstractSky
 from ._app import refuse
 from ._lamp import header, measure_lamp
 from ._options import Files
+from ._world import about
 
 
 _LARGEST_HALF = 65504.0
@@ -51,7 +52,8 @@ def write_picture(
         wavelength.size > 1 and colour.has_colour(wavelength.astype(float))
     )
     bands = as_float(wavelength)
-    weights = colour.response(bands) if seen else None
+    with about({"wavelength": "--wavelength"}):
+        weights = colour.response(bands) if seen else None
     response = None if weights is None else space.from_xyz(weights)
 
     # First what may be refused.

@@ -10,12 +10,14 @@ from ..light import AbstractLight
 from ..quantity import Direction, Length, Number, Position, Wavelength
 from ..scene import Scene
 from ._chance import Words
-from ._majorants import Cells
+from ._majorants import Cells, cross
 from ._strata import Strata
 
 
-# Thin air is met so often on the first leg, at least, and turns so often; half as often
-# where there is something behind it. What it turns more than it does weighs less.
+# Thin air is met so often on the first leg, at least, and turns so often. Where there
+# is something behind it, or in it, which is seen by those paths alone that it does not
+# turn, it turns half as often; more seldom where it is so thin that it is dark beside
+# that. What it turns more than it does weighs less.
 _MEETS, _TURNS = 4.0, 2.0
 
 
@@ -107,9 +109,13 @@ def begin(
     depth = leg.far * 0.0 if strata is None else strata.depth(leg.path, leg.far)
     lift = jnp.maximum(_MEETS / jnp.where(depth > 0.0, depth, _MEETS), 1.0)
     behind = leg.blocked | (quest.light is not None and quest.light.backdrop)
+    if (cells := quest.majorants.cells) is not None:
+        way = path.start.position, direction, leg.at, leg.far
+        behind = behind | cross(cells, *way).inside(cells)
+    share = jnp.where(behind, 0.5 * jnp.sqrt(jnp.minimum(depth, 1.0)), 1.0)
     return Trip(
         lift=lift,
-        least=jnp.where(behind, 0.5, 1.0) * _TURNS / (jnp.maximum(depth, _MEETS)),
+        least=share * _TURNS / jnp.maximum(depth, _MEETS),
         key=jax.random.key_data(key),
         step=jnp.int32(0),
         leg=leg,
