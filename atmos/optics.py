@@ -120,10 +120,7 @@ def layers(scene: Scene, extinction: Float[Array, "medium wl"], count: int) -> L
     No profile has an edge within a layer. Raises `ValueError` if there are more edges
     than layers.
     """
-    top = scene.top
-    edges = [jnp.zeros_like(top)[None], top[None]]
-    edges += [x.profile.levels.astype(top.dtype) for x in scene.media]
-    edges = jnp.sort(jnp.clip(jnp.concatenate(edges), 0.0, top))
+    edges = _edges(scene)
     spare = count + 1 - edges.shape[0]
     if spare < 0:
         raise ValueError(
@@ -133,6 +130,20 @@ def layers(scene: Scene, extinction: Float[Array, "medium wl"], count: int) -> L
     inner = _crowded(scene, edges, extinction, spare)
     altitude = jnp.sort(jnp.concatenate([edges, inner]))
     return Layers(altitude, _columns(scene, altitude[:-1], jnp.diff(altitude), 6))
+
+
+def overhead(scene: Scene) -> Float[Array, "medium"]:
+    """How many metres of density 1 of each medium lie straight above the origin."""
+    edges = _edges(scene)
+    return jnp.sum(_columns(scene, edges[:-1], jnp.diff(edges), 6), 0)
+
+
+def _edges(scene: Scene) -> Float[Array, "edge"]:
+    """The altitudes between which media are smooth."""
+    top = scene.top
+    edges = [jnp.zeros_like(top)[None], top[None]]
+    edges += [x.profile.levels.astype(top.dtype) for x in scene.media]
+    return jnp.sort(jnp.clip(jnp.concatenate(edges), 0.0, top))
 
 
 def _columns(

@@ -1,4 +1,7 @@
-"""A beam of light in smoke, fire, and a white cloud: python examples/volumes.py"""
+"""A beam of light in smoke, fire, and a white cloud: python examples/volumes.py
+
+The noise of the cloud is taken out with `pip install 'atmos[denoise]'`.
+"""
 
 import pathlib
 import sys

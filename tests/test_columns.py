@@ -107,6 +107,16 @@ def test_slabs_are_as_published(depth, albedo, g, cosine, reflected, transmitted
         assert due is None or abs(got - due) < 2e-5
 
 
+@pytest.mark.parametrize("geometry", [Flat(), Spherical(6.4e6)])
+def test_without_a_sun_all_is_dark(geometry):
+    numbers = (jnp.asarray(x) for x in (1.0, 0.9, 0.5, 0.6, 0.3, 0.5))
+    scene = dataclasses.replace(world(geometry, *numbers), lights=())
+    sky = solve(scene, Columns(streams=4, layers=8, suns=2), NM)
+    place, view = jnp.zeros(3), jnp.array([0.0, 0.6, 0.8])
+    assert sky.radiance(place, view).tolist() == [0.0]
+    assert not np.any(sky.panorama(place).radiance(view[2:, None], view[:1, None]))
+
+
 @pytest.mark.parametrize("depth", [30.0, 100.0, 1000.0])
 def test_thick_clouds_pass_as_much_as_diffusion_theory_says(depth):
     # Exact up to exp(-depth), van de Hulst 1980: 4/3 K(1) / (depth + 2 * 0.7104461),

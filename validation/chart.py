@@ -79,7 +79,7 @@ def measure(
     name: str, problems: list[Problem], entrant: AbstractEntrant, arguments, kept: Kept
 ) -> list[dict]:
     """The rows of one entrant for one class: kept, or made; none where it refuses."""
-    effort = Effort(3, 3.0) if arguments.quick else Effort(5, 40.0)
+    effort = Effort(3, 3.0) if arguments.quick else Effort(5, 10.0)
     marks = "".join(x.mark for x in problems)
     setting = entrant.setting
     stamp = f"{name}/{entrant.method}/{setting}/{entrant.edition}/{machine()}/"
@@ -128,7 +128,7 @@ def main() -> int:
     parser.add_argument("--method", nargs="*", help="these alone")
     parser.add_argument("--anew", action="store_true", help="measure all again")
     arguments = parser.parse_args()
-    arguments.samples = arguments.samples or (1024 if arguments.quick else 4096)
+    arguments.samples = arguments.samples or (1024 if arguments.quick else 1536)
     arguments.folder.mkdir(parents=True, exist_ok=True)
     for path in arguments.traced:
         if not path.exists():

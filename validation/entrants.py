@@ -390,8 +390,6 @@ def ours(quick: bool) -> Iterator[AbstractEntrant]:
     yield Solver("bruneton", "16 layers, 5 orders", coarse)
     if not quick:
         yield Solver("bruneton", "32 layers, 6 orders", Bruneton())
-        fine = Bruneton(layers=48, views=24, azimuths=12, suns=64, orders=8, degrees=16)
-        yield Solver("bruneton", "48 layers, 8 orders", fine)
     coarse = Columns(streams=8, layers=30, suns=8, pieces=8, nodes=2, single=QUICK)
     yield Solver("columns", "8 streams, 30 layers", coarse)
     for streams in [16] if quick else [8, 16, 32]:

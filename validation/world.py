@@ -10,6 +10,7 @@ must be white. A z-score is an error in standard errors.
 """
 
 import argparse
+import itertools
 import sys
 from collections.abc import Iterator
 
@@ -66,21 +67,21 @@ CLEAR = [
 
 def claims(arguments: argparse.Namespace) -> Iterator[Claim]:
     del arguments
-    judge = PathTracing(walks=4, paths=64, single=None)
+    # Looks that shared their numbers would not be so many trials.
+    keys = itertools.count(1)
     scores, errors = [], []
     for sun, *view in CLEAR:
-        due = look(scene(Spherical(6360e3), None, sun), judge, *view)
-        found = look(scene(Spherical(6360e3), None, sun), traced(1), *view)
+        due = look(scene(Spherical(6360e3), None, sun), judge(next(keys)), *view)
+        found = look(scene(Spherical(6360e3), None, sun), traced(next(keys)), *view)
         scores.append((found[0] - due[0]) / np.hypot(found[1], due[1]))
         errors.append(found[1] / found[0])
     yield from judged("clear air", scores, errors)
     for name, cloud in CLOUDS.items():
         scores, errors = [], []
-        for i, geometry in enumerate((Flat(), Spherical(6360e3))):
-            for j, view in enumerate(VIEWS):
-                due = look(scene(geometry, LAYER, 70.0), judge, *view)
-                solver = traced(2 + len(VIEWS) * i + j)
-                found = look(scene(geometry, cloud, 70.0), solver, *view)
+        for geometry in (Flat(), Spherical(6360e3)):
+            for view in VIEWS:
+                due = look(scene(geometry, LAYER, 70.0), judge(next(keys)), *view)
+                found = look(scene(geometry, cloud, 70.0), traced(next(keys)), *view)
                 scores.append((found[0] - due[0]) / np.hypot(found[1], due[1]))
                 errors.append(found[1] / found[0])
         yield from judged(f"cloud deck as a {name}", scores, errors)
@@ -99,7 +100,6 @@ def of_furnace() -> Iterator[Claim]:
             world = Scene(Flat(), 10.0, (white,), (light,), 1.0)
             # Into it from below, slantwise, and from far above.
             for view in ((0.5, 20.0, 0.0), (2.0, 75.0, 30.0), (8.0, 175.0, 0.0)):
-                # Looks that shared their numbers would not be so many trials.
                 key = jax.random.key(9 + len(scores))
                 solver = VolumeTracing(key, walks=4, paths=8, cells=1)
                 mean, error = look(world, solver, *view)
@@ -119,6 +119,10 @@ def judged(name: str, scores: list, errors: list) -> Iterator[Claim]:
     yield Claim(f"{name}: mean z, in its standard errors", source, 3.0, mean)
     error = np.median(errors)
     yield Claim(f"{name}: median standard error, relative", source, None, error)
+
+
+def judge(seed: int) -> PathTracing:
+    return PathTracing(jax.random.key(seed), walks=4, paths=64, single=None)
 
 
 def traced(seed: int) -> VolumeTracing:

@@ -109,10 +109,7 @@ class Field(AbstractField):
 
     def fluxes(self, scene: Scene, light: Sun, point: Point) -> tuple[Depth, Depth]:
         del scene
-        first, by_sun = self.suns.between(
-            light, zenith_angle(point.up, light.direction)
-        )
-        suns = first + jnp.arange(len(by_sun), dtype=jnp.int32)
+        suns, by_sun = self.suns.near(light, point)
         levels, by_level = between(self.altitude, point.altitude)
         mix = lambda x: contract("i,j,ij...->...", by_level, by_sun, x[levels][:, suns])
         scale = jnp.exp(mix(self.reference))

@@ -23,7 +23,6 @@ from ..transport import columns, contract
 from ._field import AbstractField, Field, Ground
 from ._levels import between
 from ._sight import Sight
-from ._suns import zenith_angle
 
 
 # The rational function through the chosen joins polynomials of this degree.
@@ -146,9 +145,7 @@ class Interpolated(AbstractField):
 
     def _mixed(self, light: Sun, point: Point, *known: Array) -> Iterator[Array]:
         """Of what is known for each sun, that of a light."""
-        zenith = zenith_angle(point.up, light.direction)
-        first, by_sun = self.field.suns.between(light, zenith)
-        suns = first + jnp.arange(len(by_sun), dtype=jnp.int32)
+        suns, by_sun = self.field.suns.near(light, point)
         return (contract("j,jl->l", by_sun, x[suns]) for x in known)
 
     def fluxes(self, scene: Scene, light: Sun, point: Point) -> tuple[Depth, Depth]:

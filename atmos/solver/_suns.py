@@ -8,6 +8,7 @@ import jax.numpy as jnp
 from jax.lax import stop_gradient
 from jaxtyping import Array, Float, Int
 
+from ..geometry import Point
 from ..light import Sun
 from ..quantity import Angle, deg, Direction, dot
 
@@ -24,6 +25,14 @@ class AbstractSuns(eqx.Module):
         self, light: Sun, zenith: Float[Array, "*n"]
     ) -> tuple[Int[Array, "*n"], Float[Array, "*n k"]]:
         """The first of those to mix, and how much of each, where a light stands so."""
+
+    def near(
+        self, light: Sun, point: Point
+    ) -> tuple[Int[Array, "k"], Float[Array, "k"]]:
+        """Those to mix, and how much of each, where a place sees the light."""
+        zenith = zenith_angle(point.up, light.direction)
+        first, weights = self.between(light, zenith)
+        return first + jnp.arange(len(weights), dtype=jnp.int32), weights
 
 
 class FlatSuns(AbstractSuns):

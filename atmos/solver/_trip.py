@@ -112,7 +112,8 @@ def begin(
     if (cells := quest.majorants.cells) is not None:
         way = path.start.position, direction, leg.at, leg.far
         behind = behind | cross(cells, *way).inside(cells)
-    share = jnp.where(behind, 0.5 * jnp.sqrt(jnp.minimum(depth, 1.0)), 1.0)
+    dark = jnp.sqrt(jax.lax.stop_gradient(jnp.minimum(depth, 1.0)))
+    share = jnp.where(behind, 0.5 * dark, 1.0)
     return Trip(
         lift=lift,
         least=share * _TURNS / jnp.maximum(depth, _MEETS),

@@ -6,13 +6,11 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 from jax.core import Tracer
-from jaxtyping import Array, Bool, Float
 
 from ..geometry import Flat
-from ..optics import check_layered, layers, mixture
-from ..quantity import Angle, deg, Length, Number, Wavelength
+from ..optics import check_layered, layers, mixture, overhead
+from ..quantity import deg, Number, Wavelength
 from ..scene import Scene
-from ..transport import columns, contract
 from ._base import check_stokes
 from ._diffuse import AbstractDiffuse, Diffused
 from ._field import Field, Ground
@@ -20,7 +18,8 @@ from ._follow import follow, thin
 from ._interpolated import Chosen, Glow, Interpolated, misfit
 from ._ordinates import solve_column
 from ._peaks import Peaks
-from ._suns import FlatSuns, RoundSuns
+from ._stack import Stack
+from ._suns import AbstractSuns, FlatSuns, RoundSuns
 from .single_scattering import SingleScattering
 
 
@@ -33,8 +32,6 @@ _FEW, _SMOOTH = 10, 0.01
 # Moments that near-level light tells from a peak: with 16 the brightest haze there is
 # off by 0.4 %, with 24 by 0.05 %.
 _RESOLVED = 32
-# Of light that meets so much more on its way into the shadow nothing is left there.
-_SHADE, _NIGHT = 16.0, 1e3
 
 
 class Columns(AbstractDiffuse):
@@ -140,41 +137,30 @@ class Columns(AbstractDiffuse):
         chosen = Chosen.of(wavelength, self.wavelengths or _FEW)
         few = chosen.of_mixture(mixed)
         cut = layers(scene, mixed.extinction, self.layers)
-        lights = jnp.array([x.zenith for x in scene.suns], wavelength.dtype)
-        last = 0.5 * jnp.pi + scene.geometry.dip(scene.top, jnp.zeros_like(scene.top))
-        flat = isinstance(scene.geometry, Flat)
-        suns = FlatSuns(lights) if flat else RoundSuns(lights, last, self.suns)
+        suns = self._suns(scene, wavelength)
         zeniths = suns.zeniths()
-        at = jax.vmap(_towards, (None, 0, None))
-        found, dark = jax.vmap(at, (None, None, 0), 1)(scene, cut.altitude, zeniths)
-        # Levels from the top down, as light is solved for; and in place of one more sun
-        # the ground.
-        shaded = lambda x: _shaded(contract("ksm,ml->ksl", found, x), dark[:, :, None])
-        none = ((0, 0), (0, 1), (0, 0))
-        slant_of = lambda x: jnp.pad(shaded(x), none, constant_values=_NIGHT)[::-1]
-        total = lambda x: contract("km,m...->k...", cut.column, x)[::-1]
-        cosine = jnp.concatenate([jnp.cos(zeniths), jnp.zeros_like(zeniths[:1])])
-        slant = slant_of(few.extinction)
-        column = total(few.extinction), total(few.scattering)
-        more = slant, cosine, total(few.polarised)
+        stack = Stack.of(scene, cut, zeniths)
+        slant, cosine = stack.slant(few), stack.cosine
+        column = stack.amount(few.extinction), stack.amount(few.scattering)
+        more = slant, cosine, stack.amount(few.polarised)
         light = solve_column(*column, *more, nodes=self.streams // 2)
-        arrives = lambda x: jnp.maximum(cosine, 0.0)[:, None] * jnp.exp(-x[-1])
-        lit = arrives(slant) + light.down[-1]
+        lit = stack.arrives(slant) + light.down[-1]
         glow = Glow(light.up[::-1, -1], light.down[::-1, -1], lit[:-1])
 
         share, passed = thin(column[0], slant), slant
-        if flat:  # in the round, flatness costs more than peaks that matter near level
+        # In the round flatness costs more than peaks that matter near level.
+        if isinstance(scene.geometry, Flat):
             resolved = max(self.degrees, min(2 * self.degrees, _RESOLVED))
             fine = Peaks.of(scene, wavelength, resolved, self.stokes).without
             followed = jnp.clip(chosen.smooth(jnp.min(share, 0)), 0.0, 1.0)
             mixed = mixed.towards(fine, followed)
             peaks = dataclasses.replace(peaks, without=mixed)
             few = chosen.of_mixture(mixed)
-            slant = slant_of(few.extinction)
-        column = total(few.extinction), total(few.scattering)
-        more = slant, passed, cosine, total(few.polarised), share
+            slant = stack.slant(few)
+        column = stack.amount(few.extinction), stack.amount(few.scattering)
+        more = slant, passed, cosine, stack.amount(few.polarised), share
         light, sky = follow(light, *column, *more, nodes=self.streams)
-        lit = arrives(slant) + sky
+        lit = stack.arrives(slant) + sky
         moments = jnp.swapaxes(light.moments[::-1], 1, 2)
         ground = Ground(moments[:, :, -1], sky[:-1], lit[:-1], sky[-1])
         field = Field(
@@ -191,35 +177,19 @@ class Columns(AbstractDiffuse):
         field = Interpolated(mixed, chosen, field, ground, glow, albedo)
         return Diffused(field, peaks, jnp.zeros((), wavelength.dtype))
 
+    def _suns(self, scene: Scene, wavelength: Wavelength) -> AbstractSuns:
+        """The zenith angles of lights that diffuse light is found for."""
+        lights = jnp.array([x.zenith for x in scene.suns], wavelength.dtype)
+        if isinstance(scene.geometry, Flat):
+            return FlatSuns(lights)
+        last = 0.5 * jnp.pi + scene.geometry.dip(scene.top, jnp.zeros_like(scene.top))
+        return RoundSuns(lights, last, self.suns)
+
 
 @eqx.filter_jit
 def _roughness(scene: Scene, wavelength: Wavelength, few: int) -> Number:
     """By how much few wavelengths miss what a medium takes out, scatters or turns."""
-    zero = jnp.zeros(3, wavelength.dtype)
-    path = scene.geometry.path(scene.geometry.locate(zero), zero.at[2].set(1.0))
-    found = columns(scene, path, scene.top, nodes=6)
+    found = overhead(scene)
     mixed = mixture(scene, wavelength, 2)
     depths = jnp.concatenate([mixed.extinction[:, None], mixed.scattering], 1)
     return misfit(found[:, None, None] * depths, wavelength, few)
-
-
-def _towards(
-    scene: Scene, altitude: Length, zenith: Angle
-) -> tuple[Float[Array, "medium"], Bool[Array, ""]]:
-    """The columns from a place above the origin to the sun, and if it is in shadow."""
-    start = scene.geometry.locate(jnp.zeros(3, altitude.dtype).at[2].set(altitude))
-    zero = jnp.zeros_like(zenith)
-    direction = jnp.stack([jnp.sin(zenith), zero, jnp.cos(zenith)])
-    path = scene.geometry.path(start, direction)
-    begins, ends = path.shadow(direction, zero)
-    found = columns(scene, path, path.span(scene.top).far, nodes=16)
-    return found, (begins < 0.0) & (ends > 0.0)
-
-
-def _shaded(
-    slant: Float[Array, "level sun wl"], dark: Bool[Array, "level sun 1"]
-) -> Float[Array, "level sun wl"]:
-    """Optical depths towards the sun, far larger in the shadow of the world."""
-    deepest = jnp.max(jnp.where(dark, 0.0, slant), 0, keepdims=True)
-    shade = jnp.where(dark[-1:], _NIGHT, deepest + _SHADE)
-    return jnp.where(dark, shade, slant)

@@ -6,10 +6,10 @@ import equinox as eqx
 import jax.numpy as jnp
 from jax.core import Tracer
 
-from ..optics import check_layered, layers, Mixture, mixture
+from ..optics import check_layered, layers, Mixture, mixture, overhead
 from ..quantity import Number, Wavelength
 from ..scene import Scene
-from ..transport import columns, contract
+from ..transport import contract
 from ._diffuse import AbstractDiffuse, Diffused
 from ._field import Field
 from ._second import turns
@@ -115,8 +115,5 @@ def _without_peaks(scene: Scene, wavelength: Wavelength) -> Mixture:
 @eqx.filter_jit
 def _thickest(scene: Scene, wavelength: Wavelength) -> Number:
     """The largest depth by which the air scatters, straight above the origin."""
-    zero = jnp.zeros(3, wavelength.dtype)
-    path = scene.geometry.path(scene.geometry.locate(zero), zero.at[2].set(1.0))
-    found = columns(scene, path, scene.top, nodes=6)
     scattering = _without_peaks(scene, wavelength).scattering[:, 0]
-    return jnp.max(contract("m,ml->l", found, scattering))
+    return jnp.max(contract("m,ml->l", overhead(scene), scattering))
