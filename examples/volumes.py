@@ -11,7 +11,7 @@ import numpy as np
 
 from atmos import colour, deg, image, render, Scene, solve
 from atmos.camera import Perspective
-from atmos.denoise import denoise
+from atmos.denoise import denoise, denoiser
 from atmos.geometry import Flat
 from atmos.light import Sun, sunlight
 from atmos.medium import (
@@ -118,6 +118,7 @@ def main(folder, size, cells=128):
 
     What is traced is shown without its noise.
     """
+    denoiser()  # or an error, before the work is done
     response = colour.response(WAVELENGTH)
     pictures, shown = {}, []
     for name, make in PICTURES.items():

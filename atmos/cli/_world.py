@@ -20,11 +20,8 @@ from ..solver import (
     AbstractTracing,
     Bruneton,
     Columns,
-    Fixed,
     PathTracing,
     QUICK,
-    RayMarching,
-    ShadowCache,
     Shared,
     Shells,
     SingleScattering,
@@ -34,6 +31,7 @@ from ..solver import (
 )
 from ..spectrum import AbstractSpectrum, Constant
 from ._app import refuse
+from ._march import March
 from ._options import SunPosition, World
 
 
@@ -139,7 +137,7 @@ def solver_named(
     if name == "shared":
         return Shared(single=single)
     if name == "march":
-        return RayMarching(Fixed(256), ShadowCache(96))
+        return March(steps="fixed").solver()
     return dataclasses.replace(single, stokes=stokes)
 
 
