@@ -218,7 +218,8 @@ def test_light_that_turned_in_peaks_alone_is_summed_up_in_closed_form():
             ]
             lobe = HenyeyGreenstein(g).evaluate(versine(view, light.direction), nm)
             line = sight(scene, place, view, peaks.without.extinction, 12)
-            more = peaks.scattered(scene, light, light.direction[None], nm, line, 1)[0]
+            known = scene, light, light.direction[None], nm, line
+            more = peaks.scattered(*known, once[0][None, None], 1)[0]
             return more[0] + lobe[0] * (once[0] - once[1])
 
         return jax.vmap(look)(views)

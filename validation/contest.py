@@ -135,7 +135,7 @@ def classes(arguments: argparse.Namespace) -> dict[str, list[Problem]]:
                 _trace(own, case, arguments)
     truths.append(own)
     found = {
-        name: [_traced(x, truths, arguments.scenes) for x in each]
+        name: [problem_of(x, truths, arguments.scenes) for x in each]
         for name, each in cases.items()
     }
     table = arguments.truth / "disort_converged_nanodisort.json"
@@ -161,7 +161,7 @@ def _trace(own: traced.Truth, case: traced.Case, arguments) -> None:
     traced.make(own, argparse.Namespace(**given))
 
 
-def _traced(case, truths: list[traced.Truth], scenes: pathlib.Path) -> Problem:
+def problem_of(case, truths: list[traced.Truth], scenes: pathlib.Path) -> Problem:
     truth = next(x for x in truths if f"{case.name} many" in x.arrays)
     scene = scenefile.parse(traced.described(scenes, case.scene))
     sun = jnp.asarray(traced.vectors(case.sun, 0.0))

@@ -70,7 +70,7 @@ def peers(quick: bool = False) -> Iterator[Peer]:
             yield Peer("nanodisort", f"{n} streams", cdisort(n), 89.9, True)
     if _has("PythonicDISORT"):
         for n in [8, 16] if quick else [8, 16, 32]:
-            yield Peer("PythonicDISORT", f"{n} streams", _pythonic(n), 89.9, True)
+            yield Peer("PythonicDISORT", f"{n} streams", pythonic(n), 89.9, True)
     if _has("sasktran2"):
         yield Peer("sasktran2", "single", _sasktran("NoSource"))
         for n in [8, 16]:
@@ -209,7 +209,7 @@ def cdisort(streams: int, count: int = 60) -> Look:
     return look
 
 
-def _pythonic(streams: int, count: int = 60) -> Look:
+def pythonic(streams: int, count: int = 60) -> Look:
     def look(scene, wavelength, view):
         from PythonicDISORT.pydisort import pydisort
         from PythonicDISORT.subroutines import interpolate

@@ -46,6 +46,7 @@ _ENOUGH = [
     (90.0 * deg, Resolution(96, 48, 33)),
     # The planet's shadow has an edge among what one sees: where the light stands about
     # level, between there and the horizon, which from near the ground are close by.
+    (90.1 * deg, Resolution(384, 48, 65, crowded=5)),
     (math.inf, Resolution(192, 48, 65, crowded=5)),
 ]
 _HIGH = 20.0 * km  # from here on up the thick air is a thin line

@@ -88,7 +88,7 @@ class AbstractDiffuse(AbstractSolver):
         more = jnp.zeros_like(found[:, -1])
         if peaks is not None:
             known = scene, light, towards, wavelength, line
-            more = peaks.scattered(*known, every)
+            more = peaks.scattered(*known, jnp.sum(found[:, :-1], 1), every)
         known = scene, light, towards, wavelength, line, found
         again = field.gather(*known, nodes=self.nodes)
         found = found.at[:, -1].add(more + again[:, 0])

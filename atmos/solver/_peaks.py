@@ -33,6 +33,7 @@ from ..transport import (
     gauss_legendre,
 )
 from ._azimuths import drawn
+from ._chosen import Chosen
 from ._harmonics import legendre
 from ._sight import Sight
 
@@ -55,18 +56,27 @@ class Peaks(eqx.Module):
 
     `without` are the media that diffuse light notices, their peaks not scattered. Light
     that turned once is to be found with the extinction of `within`. Only the media that
-    are counted in `sharp` have peaks.
+    are counted in `sharp` have peaks. What light turned in them is found at the chosen
+    wavelengths.
     """
 
     without: Mixture
     within: Mixture
+    chosen: Chosen
     sharp: tuple[int, ...] = eqx.field(static=True)
 
     @classmethod
     def of(
-        cls, scene: Scene, wavelength: Wavelength, degrees: int, stokes: int = 1
+        cls,
+        scene: Scene,
+        wavelength: Wavelength,
+        degrees: int,
+        stokes: int = 1,
+        chosen: Chosen | None = None,
     ) -> "Peaks":
-        """Peaks are what so many moments do not resolve."""
+        """Peaks are what so many moments do not resolve; all wavelengths are chosen
+        unless told otherwise."""
+        chosen = chosen or Chosen.of(wavelength, wavelength.size)
         broad = mixture(scene, wavelength, degrees + 1, stokes)
         fine = mixture(scene, wavelength, max(_DEGREES, degrees) + 1)
         sharp = tuple(
@@ -74,7 +84,7 @@ class Peaks(eqx.Module):
             for i, x in enumerate(scene.media)
             if x.scattering is not None and x.phase.degree >= degrees
         )
-        return cls(broad.truncated(), fine.truncated(), sharp)
+        return cls(broad.truncated(), fine.truncated(), chosen, sharp)
 
     def scattered(
         self,
@@ -83,9 +93,10 @@ class Peaks(eqx.Module):
         towards: Float[Array, "light 3"],
         wavelength: Wavelength,
         sight: Sight,
+        once: Float[Array, "light wl"],
         every: int,
     ) -> Float[Array, "light wl"]:
-        """What light that turned in peaks adds to that which turned once.
+        """What light that turned in peaks adds to that which turned `once`.
 
         Of a light that stands in one of several directions. How much there is on its
         way is found for `every` so many of them.
@@ -115,6 +126,8 @@ class Peaks(eqx.Module):
         weighed = amount * w[None, :, None]
         depth = lambda columns, x: contract("...m,ml->...l", columns, x)
         gone, met = self.without.extinction, self.within.extinction
+        few = self.chosen.of_mixture
+        without, within = few(self.without), few(self.within)
         flat = lambda x: x.reshape(-1, x.shape[-1])
         albedo = scene.ground.evaluate(wavelength) / math.pi
         up = points.up[-1]
@@ -124,33 +137,32 @@ class Peaks(eqx.Module):
             lit = (places <= begins) | (places >= ends)
             event = flat(jnp.where(lit[:, :, None], weighed, 0.0))
             there = flat(passed) + sunwards[:-1]
-            turned = self._turned(
-                event,
-                there,
-                jnp.exp(-depth(there, gone)),
-                depth(there, met),
-                versine(path.direction, towards),
-            )
+            apart = versine(path.direction, towards)
+            turned = self._turned(without, within, event, there, apart)
             there = jnp.sum(whole, 0) + sunwards[-1]
             more = jnp.exp(-depth(there, gone)) - jnp.exp(-depth(there, met))
             ground = albedo * jnp.maximum(dot(up, towards), 0.0) * more
             shown = sight.grounded & ~((begins < far) & (far < ends))
-            return turned + jnp.where(shown, ground, 0.0)
+            return turned, jnp.where(shown, ground, 0.0)
 
         irradiance = light.irradiance.evaluate(wavelength)
-        found = jax.vmap(of)(towards, drawn(ahead, towards, every))
-        return found * irradiance[None]
+        irradiance = jnp.broadcast_to(irradiance, wavelength.shape)[None]
+        turned, ground = jax.vmap(of)(towards, drawn(ahead, towards, every))
+        turned = turned * irradiance[:, self.chosen.index]
+        return self.chosen.relative(turned, once) + ground * irradiance
 
     def _turned(
         self,
+        without: Mixture,
+        within: Mixture,
         event: Float[Array, "place medium"],
         passed: Float[Array, "place medium"],
-        most: Float[Array, "place wl"],
-        depth: Float[Array, "place wl"],
         versine: Versine,
-    ) -> Float[Array, "wl"]:
-        """Of light that passed such columns, `most` of which is left without peaks."""
-        broad, fine = self.without.scattering, self.within.scattering
+    ) -> Float[Array, "few"]:
+        """Of light that passed such columns, with peaks taken off the media or not."""
+        depth = contract("sm,ml->sl", passed, within.extinction)
+        most = jnp.exp(-contract("sm,ml->sl", passed, without.extinction))
+        broad, fine = without.scattering, within.scattering
         count, missing = broad.shape[1], fine.shape[1] - broad.shape[1]
         least = jnp.exp(-depth)
         once = contract("sm,sl->ml", event, most - least)

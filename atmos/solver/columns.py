@@ -12,10 +12,11 @@ from ..optics import check_layered, layers, mixture, overhead
 from ..quantity import deg, Number, Wavelength
 from ..scene import Scene
 from ._base import check_stokes
+from ._chosen import Chosen, misfit
 from ._diffuse import AbstractDiffuse, Diffused
 from ._field import Field, Ground
 from ._follow import follow, thin
-from ._interpolated import Chosen, Glow, Interpolated, misfit
+from ._interpolated import Glow, Interpolated
 from ._ordinates import solve_column
 from ._peaks import Peaks
 from ._stack import Stack
@@ -132,9 +133,9 @@ class Columns(AbstractDiffuse):
         return dataclasses.replace(self, wavelengths=few)
 
     def prepare(self, scene: Scene, wavelength: Wavelength) -> Diffused:
-        peaks = Peaks.of(scene, wavelength, self.degrees, self.stokes)
-        mixed = peaks.without
         chosen = Chosen.of(wavelength, self.wavelengths or _FEW)
+        peaks = Peaks.of(scene, wavelength, self.degrees, self.stokes, chosen)
+        mixed = peaks.without
         few = chosen.of_mixture(mixed)
         cut = layers(scene, mixed.extinction, self.layers)
         suns = self._suns(scene, wavelength)
