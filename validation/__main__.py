@@ -24,20 +24,26 @@ from typing import NamedTuple
 
 
 class Part(NamedTuple):
-    """A module, and if it takes long or wants the published tables."""
+    """A module, and if it takes long or wants the published tables, or what is traced.
+
+    What wants that wants the scenes it was traced for, too.
+    """
 
     about: str
     long: bool = False
     tables: bool = False
+    traced: bool = False
     more: tuple[str, ...] = ()
 
 
 PARTS = {
     "single_scattering": Part("Light that turned once"),
     "columns": Part("Discrete ordinates in flat columns", True, True),
-    "orders": Part("All orders in the round", True),
+    "orders": Part("All orders in the round", True, traced=True),
     "derivatives": Part("Slopes of radiance", True),
-    "multiple_scattering": Part("Path tracing itself", True, True, ("--slabs", "2000")),
+    "multiple_scattering": Part(
+        "Path tracing itself", True, True, more=("--slabs", "2000")
+    ),
     "polarisation": Part("Polarised light", True, True),
     "volumes": Part("Clouds and smoke", True, True),
     "world": Part("Clouds in round air, and even light", True),
@@ -47,7 +53,8 @@ PARTS = {
     "panorama": Part("Tables of directions", True),
     "envmap": Part("Pictures as lights elsewhere"),
     "colour": Part("Colours"),
-    "speed": Part("Speed", True, False, ("--no-commands",)),
+    "ratios": Part("Speed beside that of others", True, traced=True),
+    "speed": Part("Speed", True, more=("--no-commands",)),
 }
 TRUTH = "truth.npz"
 PEERS = [
@@ -75,7 +82,7 @@ def run(name: str, arguments: argparse.Namespace) -> Outcome:
     command += ["--json", str(file)]
     if PARTS[name].tables:
         command += ["--truth", str(arguments.truth)]
-    if name == "orders":
+    if PARTS[name].traced:
         command += ["--scenes", str(arguments.scenes)]
         command += ["--traced", str(arguments.traced or arguments.folder / TRUTH)]
     file.unlink(missing_ok=True)
@@ -228,14 +235,14 @@ def main() -> int:
     tables = arguments.truth.is_dir()
     if not tables:
         missing.append(f"what reads published tables: {arguments.truth} is no folder")
-    if "orders" in wanted and not arguments.scenes.is_dir():
-        missing.append(f"orders, whose scenes are not in {arguments.scenes}")
-        wanted.remove("orders")
     missing += [f"not asked for: {', '.join(idle)}"] if idle else []
     found = {}
     for name in wanted:
         if PARTS[name].tables and not tables:
             missing.append(f"{name}, which reads published tables")
+            continue
+        if PARTS[name].traced and not arguments.scenes.is_dir():
+            missing.append(f"{name}, whose scenes are not in {arguments.scenes}")
             continue
         found[name] = kept(name, arguments)
         x = found[name]

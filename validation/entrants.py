@@ -400,8 +400,6 @@ def ours(quick: bool) -> Iterator[AbstractEntrant]:
     yield Solver("shells", "20 layers", coarse)
     if not quick:
         yield Solver("shells", "40 layers", Shells())
-        fine = Shells(layers=60, grounded=16, azimuths=16, degrees=20, suns=96)
-        yield Solver("shells", "60 layers", fine)
 
 
 def entrants(quick: bool) -> tuple[list[AbstractEntrant], list[str]]:
