@@ -243,7 +243,7 @@ def claims(arguments: argparse.Namespace) -> Iterator[Claim]:
     # Thin air wants more streams near the horizon, thick air more layers.
     thin = sum(x <= THIN for x in depths)
     fine = solver.Columns(streams=48, layers=40, stokes=3)
-    deep = solver.Columns(streams=32, layers=160, stokes=3)
+    deep = solver.Columns(streams=32, layers=200, stokes=3)
     error = [
         errors([depths[:thin], *axes], known[:, :thin], fine),
         errors([depths[thin:], *axes], known[:, thin:], deep),
