@@ -66,6 +66,8 @@ class Chosen(eqx.Module):
 
     def of_mixture(self, mixture: Mixture) -> Mixture:
         """The media at some wavelengths."""
+        if self.whole:
+            return mixture
         return jax.tree.map(lambda x: x[..., self.index], mixture)
 
     def smooth(self, known: Float[Array, "*n few"]) -> Float[Array, "*n wl"]:
