@@ -131,7 +131,8 @@ def classes(arguments: argparse.Namespace) -> dict[str, list[Problem]]:
     own = traced.Truth(arguments.folder / "truth.npz")
     for each in cases.values():
         for case in each:
-            if not any(f"{case.name} many" in x.arrays for x in truths):
+            known = any(f"{case.name} many" in x.arrays for x in truths)
+            if not known and own.paths(case) < arguments.samples:
                 _trace(own, case, arguments)
     truths.append(own)
     found = {
@@ -161,11 +162,19 @@ def _trace(own: traced.Truth, case: traced.Case, arguments) -> None:
     traced.make(own, argparse.Namespace(**given))
 
 
-def problem_of(case, truths: list[traced.Truth], scenes: pathlib.Path) -> Problem:
-    truth = next(x for x in truths if f"{case.name} many" in x.arrays)
+def scene_of(case: traced.Case, scenes: pathlib.Path) -> atmos.Scene:
+    """The scene of a case, under its sun."""
     scene = scenefile.parse(traced.described(scenes, case.scene))
     sun = jnp.asarray(traced.vectors(case.sun, 0.0))
-    scene = eqx.tree_at(lambda x: x.lights[0].direction, scene, sun)
+    return eqx.tree_at(lambda x: x.lights[0].direction, scene, sun)
+
+
+def problem_of(
+    case: traced.Case, truths: list[traced.Truth], scenes: pathlib.Path
+) -> Problem:
+    """What is seen of a case, as the first file that has it tells."""
+    truth = next(x for x in truths if f"{case.name} many" in x.arrays)
+    scene = scene_of(case, scenes)
     angles = truth.arrays[f"{case.name} angles"]
     azimuths = np.unique(angles[:, 1])
     zeniths = angles[:: len(azimuths), 0]

@@ -126,6 +126,11 @@ class Truth:
         parts = [self.arrays[f"{case.name} {x}"] for x in ("many", "error", "blocks")]
         return parts[0], parts[1], int(parts[2])
 
+    def paths(self, case: Case) -> int:
+        """How many a direction there are."""
+        walks = int(self.arrays.get("--walks", 0))
+        return self.get(case)[2] * walks * PATHS
+
     def radiance(self, case: Case) -> np.ndarray:
         return self.arrays[f"{case.name} many"] + self.arrays[f"{case.name} once"]
 

@@ -57,8 +57,7 @@ def complete(truth: traced.Truth, arguments: argparse.Namespace) -> None:
     for scene in SCENES:
         for sun in SUNS:
             samples = arguments.samples * (TWILIGHT if sun > 92.0 else 1)
-            blocks = truth.get(traced.Case(scene, sun, 0.0))[2]
-            if blocks * walks * traced.PATHS >= samples:
+            if truth.paths(traced.Case(scene, sun, 0.0)) >= samples:
                 continue
             wanted = {"scene": [scene], "suns": [sun], "altitudes": [0.0], "error": 0.0}
             given = vars(arguments) | wanted | {"walks": walks, "samples": samples}

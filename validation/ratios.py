@@ -19,18 +19,15 @@ import warnings
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
-import equinox as eqx
-import jax.numpy as jnp
 import numpy as np
 
 import atmos
-from atmos import scenefile
 from atmos.geometry import Flat
 from atmos.solver import AbstractSolver, Columns, QUICK
 
 from . import multiple_scattering as traced, peers
 from .claim import Claim, main
-from .contest import NM, Problem, problem_of
+from .contest import NM, Problem, problem_of, scene_of
 from .entrants import among, Effort, looked, timed
 from .peers import View
 
@@ -75,12 +72,6 @@ def flat_peers() -> Iterator[tuple[str, str, peers.Look]]:
         for streams, layers in ((16, 30), (32, 30), (32, 60), (48, 60), (64, 60)):
             look = peers.pythonic(streams, layers)
             yield "PythonicDISORT", f"{streams} streams, {layers} layers", look
-
-
-def world(scenes: pathlib.Path) -> atmos.Scene:
-    scene = scenefile.parse(traced.described(scenes, CASE.scene))
-    sun = jnp.asarray(traced.vectors(CASE.sun, 0.0))
-    return eqx.tree_at(lambda x: x.lights[0].direction, scene, sun)
 
 
 def run(method: str, setting: str, look: Callable, error: Callable, effort) -> Run:
@@ -145,7 +136,7 @@ def ratio(runs: list[Run], peer: str, most: float, bar: float) -> Iterator[Claim
 
 def claims(arguments: argparse.Namespace) -> Iterator[Claim]:
     warnings.simplefilter("ignore")  # of albedos next to 1
-    runs = list(flat(world(arguments.scenes)))
+    runs = list(flat(scene_of(CASE, arguments.scenes)))
     for peer, (bar, errors) in FLAT.items():
         for most in errors:
             yield from ratio(runs, peer, most, bar)

@@ -74,8 +74,10 @@ class Peaks(eqx.Module):
         stokes: int = 1,
         chosen: Chosen | None = None,
     ) -> "Peaks":
-        """Peaks are what so many moments do not resolve; all wavelengths are chosen
-        unless told otherwise."""
+        """Peaks are what so many moments do not resolve.
+
+        All wavelengths are chosen unless told otherwise.
+        """
         chosen = chosen or Chosen.of(wavelength, wavelength.size)
         broad = mixture(scene, wavelength, degrees + 1, stokes)
         fine = mixture(scene, wavelength, max(_DEGREES, degrees) + 1)
