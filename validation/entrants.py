@@ -20,14 +20,23 @@ import warnings
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Array
 
 import atmos
 from atmos import camera, deg, light, render
 from atmos.geometry import Flat
-from atmos.sky import AbstractFittedSky, AbstractSky, Clamp, Hosek, Preetham
+from atmos.sky import (
+    AbstractFittedSky,
+    AbstractPanorama,
+    AbstractSky,
+    Clamp,
+    Hosek,
+    Preetham,
+)
 from atmos.solver import (
     AbstractSolver,
     Bruneton,
@@ -129,8 +138,13 @@ def looked(sky: AbstractSky, view: View, sun: float) -> np.ndarray:
     """Radiances as a picture in rows has them: [zenith, azimuth, wl]."""
     table = sky.panorama(jnp.array([0.0, 0.0, view.altitude], jnp.float32))
     angles = np.radians(view.zeniths)[:, None], sun + np.radians(view.azimuths)[None]
-    found = table.radiance(*(jnp.asarray(x, jnp.float32) for x in angles))
+    found = _looked(table, *(jnp.asarray(x, jnp.float32) for x in angles))
     return np.asarray(found, float)
+
+
+@eqx.filter_jit
+def _looked(table: AbstractPanorama, zenith: Array, azimuth: Array) -> Array:
+    return table.radiance(zenith, azimuth)
 
 
 def dome(sky: AbstractSky, altitude: float):

@@ -58,7 +58,8 @@ def ours() -> Iterator[tuple[str, AbstractSolver]]:
     quick = {"pieces": 8, "nodes": 2, "single": QUICK}
     yield "8 streams, 30 layers", Columns(streams=8, layers=30, suns=8, **quick)
     yield "12 streams, 30 layers", Columns(streams=12, layers=30, suns=8, **quick)
-    yield "16 streams, 30 layers", Columns(layers=30, single=QUICK)
+    yield "12 streams, 60 layers", Columns(streams=12)
+    yield "14 streams, 60 layers", Columns(streams=14)
     yield "16 streams, 60 layers", Columns()
 
 

@@ -21,6 +21,8 @@ from ._base import AbstractPanorama
 
 # Rings keep this far off the horizon, so that rounding leaves no doubt on which side.
 _SLIVER = 1e-5
+# Rings that a cubic needs.
+_FEWEST = 4
 # How much finer a grid is that is joined by straight lines; azimuths on it, at least.
 _FINER, _FINEST = 4, 33
 
@@ -28,8 +30,9 @@ _FINER, _FINEST = 4, 33
 class Resolution(eqx.Module):
     """How many rings lie above and below the horizon; azimuths on half of each.
 
-    One azimuth in `every` is enough for light that turned once. Rings above the horizon
-    lie at the powers `crowded` of even steps.
+    One azimuth in `every` is enough for light that turned once, a single one where
+    `every` is no less than `around`. Rings above the horizon lie at the powers
+    `crowded` of even steps.
     """
 
     above: int = eqx.field(static=True)
@@ -52,19 +55,24 @@ _ENOUGH = [
 _HIGH = 20.0 * km  # from here on up the thick air is a thin line
 
 
-def fine_enough(altitude: float, lowest: float, around: int) -> Resolution:
+def fine_enough(
+    altitude: float, lowest: float, around: int, flat: bool = False
+) -> Resolution:
     """The grid that shows a sky to about 1e-3.
 
     For an observer's altitude in m, and the zenith angle of the lowest light, in rad,
-    as it is where the horizon is; with no fewer azimuths than `around`.
+    as it is where the horizon is; with no fewer azimuths than `around`. In a flat world
+    air is lit alike in all azimuths.
     """
     size = next(size for most, size in _ENOUGH if lowest <= most)
     if altitude > _HIGH:
         size = Resolution(192, 48, max(2 * size.around - 1, 17))
+    if altitude <= 0.0:  # of the ground one sees but where one stands
+        size = dataclasses.replace(size, below=_FEWEST)
     every = max((around - 1) // (size.around - 1), 1)
     around = max(size.around, around)
     every = every if (around - 1) % every == 0 else 1
-    return dataclasses.replace(size, around=around, every=every)
+    return dataclasses.replace(size, around=around, every=around if flat else every)
 
 
 class Grid(eqx.Module):

@@ -5,27 +5,33 @@ from collections.abc import Callable
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, PyTree
 
 from ..transport import contract
 
 
 def drawn(
-    look: Callable[[Float[Array, "3"]], Float[Array, "*n"]],
+    look: Callable[[Float[Array, "3"]], PyTree[Float[Array, "..."]]],
     towards: Float[Array, "light 3"],
     every: int,
-) -> Float[Array, "light *n"]:
+) -> PyTree[Float[Array, "light ..."]]:
     """A look for each of several lights: for `every` so many of them, and cubics."""
     found = jax.vmap(look)(towards[::every])
     if every == 1:
         return found
-    weights = jnp.asarray(_cubics(len(towards), every), found.dtype)
-    return contract("as,s...->a...", weights, found)
+    weights = _cubics(len(towards), every)
+    mix = lambda x: contract("as,s...->a...", jnp.asarray(weights, x.dtype), x)
+    return jax.tree.map(mix, found)
 
 
 def _cubics(count: int, every: int) -> np.ndarray:
-    """What some azimuths weigh at all, where beyond either end is what lies before."""
+    """What some azimuths weigh at all, where beyond either end is what lies before.
+
+    One alone is all there is.
+    """
     last = (count - 1) // every
+    if last == 0:
+        return np.ones((count, 1))
     weights = np.zeros((count, last + 1))
     for i in range(count):
         x = 1.0 + i % every / every

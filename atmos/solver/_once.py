@@ -69,16 +69,22 @@ class Once(eqx.Module):
             sun = jnp.stack([jnp.sin(zenith), zero, rises])
             path = self.scene.geometry.path(start, view)
             begins, ends = jnp.clip(path.shadow(sun, zero), 0.0, length)
+
+            def at(along):
+                q = along * (along + 2.0 * sign * ahead)
+                root = jnp.sqrt(jnp.maximum(radius * radius + q, 0.0))
+                return jnp.maximum(altitude + q / (root + radius), 0.0)
+
             lit = length - (ends - begins)
             along = lit * u
             along = jnp.where(along < begins, along, along + (ends - begins))
-            q = along * (along + 2.0 * sign * ahead)
-            rise = q / (jnp.sqrt(jnp.maximum(radius * radius + q, 0.0)) + radius)
-            height = jnp.maximum(altitude + rise, 0.0)
+            height = at(along)
             turn = dot(view, sun)
             past = self.sunlight.columns(height, radius * rises + along * turn)
-            density = jax.vmap(lambda x: above(self.scene, x))(height)
-            past += (0.5 * along)[:, None] * (density + here[None])
+            densities = jax.vmap(lambda x: above(self.scene, x))
+            density, between = densities(height), densities(at(0.5 * along))
+            # By Simpson's rule.
+            past += (along / 6.0)[:, None] * (density + 4.0 * between + here[None])
             return lit * w, density, past, turn, jnp.stack(vibration(up, view, sun))
 
         over = jax.vmap(one, (None, None, None, None, 0))

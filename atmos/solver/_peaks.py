@@ -23,7 +23,7 @@ from jaxtyping import Array, Float
 
 from ..light import Sun
 from ..optics import Mixture, mixture
-from ..quantity import dot, Versine, versine, Wavelength
+from ..quantity import dot, versine, Wavelength
 from ..scene import Scene
 from ..transport import (
     columns,
@@ -111,57 +111,54 @@ class Peaks(eqx.Module):
         # The last of the places is where the line of sight ends.
         points = jax.vmap(path.at)(jnp.append(places.ravel(), far))
         density = jax.vmap(lambda x: densities(scene, x))(points)
-
-        def ahead(towards):
-            def of(point):
-                sunwards = scene.geometry.path(point, towards)
-                end = sunwards.span(scene.top).far
-                return columns(scene, sunwards, end, nodes=_LIGHT_NODES)
-
-            return jax.vmap(of)(points)
-
         amount = density[:-1].reshape(*places.shape, -1) * length[:, None, None]
         whole = contract("j,pjm->pm", w, amount)
         inner = jnp.asarray(cumulative(_NODES), far.dtype)
         before = jnp.cumsum(whole, 0) - whole
         passed = before[:, None] + contract("ij,pjm->pim", inner, amount)
         weighed = amount * w[None, :, None]
-        depth = lambda columns, x: contract("...m,ml->...l", columns, x)
-        gone, met = self.without.extinction, self.within.extinction
-        few = self.chosen.of_mixture
-        without, within = few(self.without), few(self.within)
         flat = lambda x: x.reshape(-1, x.shape[-1])
-        albedo = scene.ground.evaluate(wavelength) / math.pi
-        up = points.up[-1]
 
-        def of(towards, sunwards):
+        def turned(towards):
+            def ahead(point):
+                sunwards = scene.geometry.path(point, towards)
+                end = sunwards.span(scene.top).far
+                return columns(scene, sunwards, end, nodes=_LIGHT_NODES)
+
+            sunwards = jax.vmap(ahead)(points)
             begins, ends = path.shadow(towards, jnp.zeros_like(far))
             lit = (places <= begins) | (places >= ends)
             event = flat(jnp.where(lit[:, :, None], weighed, 0.0))
-            there = flat(passed) + sunwards[:-1]
-            apart = versine(path.direction, towards)
-            turned = self._turned(without, within, event, there, apart)
-            there = jnp.sum(whole, 0) + sunwards[-1]
-            more = jnp.exp(-depth(there, gone)) - jnp.exp(-depth(there, met))
-            ground = albedo * jnp.maximum(dot(up, towards), 0.0) * more
-            shown = sight.grounded & ~((begins < far) & (far < ends))
-            return turned, jnp.where(shown, ground, 0.0)
+            lobe = self._turned(event, flat(passed) + sunwards[:-1])
+            return lobe, sunwards[-1]
 
+        lobes, sunwards = drawn(turned, towards, every)
+        apart = jax.vmap(lambda x: versine(path.direction, x))(towards)
+        seen = contract("ka,akl->al", legendre(apart, lobes.shape[1]), lobes)
         irradiance = light.irradiance.evaluate(wavelength)
-        irradiance = jnp.broadcast_to(irradiance, wavelength.shape)[None]
-        turned, ground = jax.vmap(of)(towards, drawn(ahead, towards, every))
-        turned = turned * irradiance[:, self.chosen.index]
-        return self.chosen.relative(turned, once) + ground * irradiance
+        irradiance = jnp.broadcast_to(irradiance, wavelength.shape)
+        seen = seen * irradiance[self.chosen.index][None]
+        seen = self.chosen.relative(seen, once)
+
+        def ground(towards, sunwards):
+            there = jnp.sum(whole, 0) + sunwards
+            arrives = lambda x: jnp.exp(-contract("m,ml->l", there, x.extinction))
+            more = arrives(self.without) - arrives(self.within)
+            begins, ends = path.shadow(towards, jnp.zeros_like(far))
+            shown = sight.grounded & ~((begins < far) & (far < ends))
+            rise = jnp.maximum(dot(points.up[-1], towards), 0.0)
+            return jnp.where(shown, rise * more, 0.0)
+
+        white = scene.ground.evaluate(wavelength) / math.pi * irradiance
+        return seen + white[None] * jax.vmap(ground)(towards, sunwards)
 
     def _turned(
         self,
-        without: Mixture,
-        within: Mixture,
         event: Float[Array, "place medium"],
         passed: Float[Array, "place medium"],
-        versine: Versine,
-    ) -> Float[Array, "few"]:
-        """Of light that passed such columns, with peaks taken off the media or not."""
+    ) -> Float[Array, "degree few"]:
+        """Of light that passed such columns: by degrees of the turn it made."""
+        without, within = map(self.chosen.of_mixture, (self.without, self.within))
         depth = contract("sm,ml->sl", passed, within.extinction)
         most = jnp.exp(-contract("sm,ml->sl", passed, without.extinction))
         broad, fine = without.scattering, within.scattering
@@ -195,9 +192,7 @@ class Peaks(eqx.Module):
             mixed = mixed + x[:, None] * row[None]
             before, row = row, 2.0 * ratio * row - before
 
-        lobe = legendre(versine, fine.shape[1])
-        more = ratio * jnp.sum(peak * mixed, 0)
-        return contract("k,kl->l", lobe[:count], once) + contract("k,kl->l", lobe, more)
+        return (ratio * jnp.sum(peak * mixed, 0)).at[:count].add(once)
 
 
 def _orders(x: Array, depth: Array) -> Array:

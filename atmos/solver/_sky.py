@@ -13,7 +13,7 @@ import numpy as np
 from jax.core import Tracer
 from jaxtyping import Array, Float, PyTree
 
-from ..geometry import AbstractGeometry
+from ..geometry import AbstractGeometry, Flat
 from ..light import Sun
 from ..phase import Isotropic
 from ..polarisation import vibration
@@ -114,7 +114,8 @@ class SolvedSky(AbstractSky):
             lowest = _known(_lowest(self.scene.geometry, position, towards))
             if math.isfinite(lowest):
                 self.solver.check_panorama(self.scene, lowest)
-            size = fine_enough(altitude, lowest, self.solver.around)
+            flat = isinstance(self.scene.geometry, Flat)
+            size = fine_enough(altitude, lowest, self.solver.around, flat)
         return _tabulate(self, position, size)
 
     @property
@@ -176,7 +177,8 @@ _RINGS, _RINGS_ON_CPU = 80, 8
 def _tabulate(sky: SolvedSky, position: Position, resolution: Resolution) -> Panorama:
     """The sky on a grid of directions, one light after the other."""
     grid, phases, sides, blocks = _frame(sky, position, resolution)
-    every = resolution.every if resolution.around <= _AROUND else 1
+    alone = resolution.every >= resolution.around
+    every = resolution.every if alone or resolution.around <= _AROUND else 1
 
     def seen(light):
         look = lambda x: _looks(sky, light, position, x[0], x[1], every)

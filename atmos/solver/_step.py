@@ -119,24 +119,30 @@ class Elsewhere(eqx.Module):
 class Step(eqx.Module):
     """What steps do to light, which is told relative to a reference.
 
-    `through` is what they leave of it, and `far` and `near` are the shares of the
-    sources at both ends; the first two as seen from where the steps begin.
+    `through` is what they leave of it, and `far`, `near` and `bent` are the shares of
+    the sources at both ends and of what there is more half way; the first two as seen
+    from where the steps begin.
     """
 
     through: Float[Array, "ray azimuth sun wl"]
     far: Float[Array, "ray azimuth sun wl"]
     near: Float[Array, "ray azimuth sun wl"]
+    bent: Float[Array, "ray azimuth sun wl"]
     begin: Elsewhere
 
     def carry(
-        self, light: Array, sources: tuple[Array, Array] | None
+        self, light: Array, sources: tuple[Array, Array, Array] | None
     ) -> Float[Array, "stokes ray azimuth sun wl"]:
-        """Light where the steps end, with what the sources at both ends add."""
+        """Light where the steps end, with what the sources add.
+
+        Those at both ends, and by how much the one half way is more than their mean.
+        """
         left = self.through[None] * light
         if sources is None:
             return self.begin.take(left)
-        sent = left + self.far[None] * sources[0]
-        return self.begin.take(sent) + self.near[None] * sources[1]
+        far, near, bent = sources
+        sent = self.begin.take(left + self.far[None] * far)
+        return sent + self.near[None] * near + self.bent[None] * bent
 
 
 def step(
@@ -151,9 +157,9 @@ def step(
     `begins` and `ends` are the logarithm of the reference at both ends.
     """
     end, begin = suns.seen_from(-angle), suns.seen_from(angle)
-    through, far, _ = _attenuation(depth, end.look(ends) - begins[:, None])
-    _, _, near = _attenuation(depth, ends[:, None] - begin.look(begins))
-    return Step(through, far, near, begin)
+    through, far, *_ = _attenuation(depth, end.look(ends) - begins[:, None])
+    *_, near, bent = _attenuation(depth, ends[:, None] - begin.look(begins))
+    return Step(through, far, near, bent, begin)
 
 
 # Below this their series are exacter than the closed forms.
@@ -163,10 +169,10 @@ _THIN = 0.15
 def _attenuation(
     depth: Float[Array, "ray wl"], gain: Float[Array, "ray azimuth sun"]
 ) -> tuple[Float[Array, "ray azimuth sun wl"], ...]:
-    """What is left of light, and the shares of the sources at both ends.
+    """What is left of light, and the shares of the sources at both ends and half way.
 
-    Relative to a reference whose logarithm grows by `gain`, evenly with optical depth,
-    as do sources relative to it.
+    Relative to a reference whose logarithm grows by `gain`, evenly with optical depth.
+    Sources relative to it are parabolas.
     """
     depth = depth[:, None, None]
     through = jnp.exp(-depth) * jnp.exp(-gain)[..., None]
@@ -177,4 +183,7 @@ def _attenuation(
     far = jnp.where(thin, far, scale * (1.0 - through * (1.0 + k)))
     near = 0.5 - k * (1.0 / 6.0 - k * (1.0 / 24.0 - k / 120.0))
     near = jnp.where(thin, near, scale * (k - 1.0 + through))
-    return through, depth * far, depth * near
+    bent = 4.0 / 6.0 - k * (4.0 / 12.0 - k * (0.1 - k * (1.0 / 45.0 - k / 252.0)))
+    scale = 4.0 / jnp.where(thin, 1.0, k**3)
+    bent = jnp.where(thin, bent, scale * (k - 2.0 + through * (k + 2.0)))
+    return through, depth * far, depth * near, depth * bent

@@ -14,7 +14,7 @@ from ._rays import radius_of
 
 
 # Places on each line that meets the ground, or on half of one that does not; lines.
-_PLACES, _LINES = 160, 128
+_PLACES, _LINES = 320, 384
 
 
 class Sunlight(eqx.Module):

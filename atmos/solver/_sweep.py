@@ -32,14 +32,16 @@ class Sweep(eqx.Module):
 
     `turned` is the single-scattering albedo of each layer times the moments of its
     phase function, `polarised` that times those of polarisation, `up` and `down` are
-    optical depths of steps. The logarithm of what light is told relative to is
-    `reference`. Light is I, or I, Q and U where `stokes` is 3.
+    optical depths of steps. What four levels around a layer weigh in its midst, beyond
+    the mean of the middle ones, are `bends`. The logarithm of what light is told
+    relative to is `reference`. Light is I, or I, Q and U where `stokes` is 3.
     """
 
     rays: Rays
     suns: Suns
     up: Float[Array, "layer ray wl"]
     down: Float[Array, "layer ray wl"]
+    bends: Float[Array, "layer 4 wl"]
     turned: Float[Array, "layer l wl"]
     polarised: Float[Array, "layer k 3 wl"]
     albedo: Fraction
@@ -55,15 +57,27 @@ class Sweep(eqx.Module):
         return self._carry(None, once)
 
     def _carry(self, moments: Array | None, once: Once | None) -> Light:
-        falls, kept = self._fall(moments, once)
+        bent = None if moments is None else self._bent(moments)
+        falls, kept = self._fall(moments, bent, once)
         shines = falls.down[0]
         if once is not None:
             shines += once.ground() * jnp.exp(-self.reference[0])[:, None]
-        rises = self._rise(moments, once, kept, shines * self.albedo[None])
+        shines *= self.albedo[None]
+        rises = self._rise(moments, bent, once, kept, shines)
         return jax.tree.map(jnp.add, falls, rises)
 
+    def _bent(
+        self, moments: Float[Array, "level row sun wl"]
+    ) -> Float[Array, "layer row sun wl"]:
+        """By how much the midst of each layer has more than its faces on average."""
+        layers = len(self.turned)
+        around = jnp.pad(moments, ((1, 1), (0, 0), (0, 0), (0, 0)), mode="edge")
+        return sum(
+            self.bends[:, i, None, None] * around[i : i + layers] for i in range(4)
+        )
+
     def _fall(
-        self, moments: Array | None, once: Once | None
+        self, moments: Array | None, bent: Array | None, once: Once | None
     ) -> tuple[Light, Float[Array, "layer stokes azimuth sun wl"]]:
         """What comes down; and what of it turns round in each layer, at its top."""
         rays = self.rays
@@ -80,6 +94,7 @@ class Sweep(eqx.Module):
                 sources = (
                     _source(above, turned, moments[i + 1]),
                     _source(here, turned, moments[i]),
+                    _source(here, turned, bent[i]),
                 )
             light = step(self.suns, angle, depth, begins, ends).carry(light, sources)
             if once is not None:
@@ -102,6 +117,7 @@ class Sweep(eqx.Module):
     def _rise(
         self,
         moments: Array | None,
+        bent: Array | None,
         once: Once | None,
         kept: Float[Array, "layer stokes azimuth sun wl"],
         shines: Float[Array, "sun wl"],
@@ -124,8 +140,20 @@ class Sweep(eqx.Module):
             if moments is not None:
                 below = self._basis(rays.cosine[i])[1]
                 far = _source(below, turned, moments[i])
-                one = _source(ahead[:, turns][:, None], turned, moments[i + 1])
-                sources = swap(far, one[:, 0]), _source(here, turned, moments[i + 1])
+                alone = lambda basis, x: _source(basis[:, turns][:, None], turned, x)[
+                    :, 0
+                ]
+                # Such a line is lowest half way.
+                half = jnp.exp(0.5 * (begins[0] - ends[0]))[None, :, None]
+                midst = half * (0.5 * (moments[i] + moments[i + 1]) + bent[i])
+                sources = (
+                    swap(far, alone(ahead, moments[i + 1])),
+                    _source(here, turned, moments[i + 1]),
+                    swap(
+                        _source(here, turned, bent[i]),
+                        alone(here, midst - moments[i + 1]),
+                    ),
+                )
             begins = jnp.where(which[0, :, :, 0, 0], ends, begins)
             steps = step(self.suns, angle, depth, begins, ends)
             light = steps.carry(swap(light, kept), sources)

@@ -17,6 +17,7 @@ from ._base import check_stokes
 from ._diffuse import AbstractDiffuse, Diffused
 from ._field import Field
 from ._krylov import fixed_point
+from ._levels import bends
 from ._once import Once
 from ._peaks import Peaks
 from ._rays import rays
@@ -135,6 +136,7 @@ class Shells(AbstractDiffuse):
             suns=suns,
             up=through(lines.up),
             down=through(lines.down),
+            bends=bends(depth[:, 0]),
             turned=within(mixed.scattering) * share,
             polarised=within(mixed.polarised) * share[:, None],
             albedo=jnp.broadcast_to(ground, wavelength.shape),
