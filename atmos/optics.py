@@ -189,7 +189,7 @@ def _crowded(
     thick = whole * jnp.max(extinction, 1, initial=0.0)
     weight = jnp.where(whole > 0.0, thick / (thick + _THIN), 0.0)
     weight = weight / jnp.where(whole > 0.0, whole, 1.0)
-    amount = 0.5 * step / edges[-1] + 0.5 * logarithm
+    amount = 1.5 * step / edges[-1] + 0.5 * logarithm
     amount += jnp.einsum("pim,m->pi", column, weight, precision="highest")
     total = jnp.cumsum(amount)
     total = jnp.concatenate([jnp.zeros_like(total[:1]), total])

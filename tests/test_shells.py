@@ -180,7 +180,7 @@ def test_what_is_not_absorbed_leaves():
     depth = np.trapezoid(np.where(height < TOP, density, 0.0), along, axis=1)
     passed = np.trapezoid(2.0 * (RADIUS + above) * np.exp(-depth), above)
     met = 1.0 - passed / (RADIUS + TOP) ** 2
-    assert leaves == pytest.approx(met, rel=2e-3)
+    assert leaves == pytest.approx(met, rel=1e-4)
 
 
 # Small, to have slopes; in fewer layers those of how bright it is itself are missed.
