@@ -140,19 +140,16 @@ class Sweep(eqx.Module):
             if moments is not None:
                 below = self._basis(rays.cosine[i])[1]
                 far = _source(below, turned, moments[i])
-                alone = lambda basis, x: _source(basis[:, turns][:, None], turned, x)[
-                    :, 0
-                ]
+                one = lambda x: x[:, turns][:, None]
+                turn = _source(one(ahead), turned, moments[i + 1])
                 # Such a line is lowest half way.
                 half = jnp.exp(0.5 * (begins[0] - ends[0]))[None, :, None]
                 midst = half * (0.5 * (moments[i] + moments[i + 1]) + bent[i])
+                lower = _source(one(here), turned, midst - moments[i + 1])
                 sources = (
-                    swap(far, alone(ahead, moments[i + 1])),
+                    swap(far, turn[:, 0]),
                     _source(here, turned, moments[i + 1]),
-                    swap(
-                        _source(here, turned, bent[i]),
-                        alone(here, midst - moments[i + 1]),
-                    ),
+                    swap(_source(here, turned, bent[i]), lower[:, 0]),
                 )
             begins = jnp.where(which[0, :, :, 0, 0], ends, begins)
             steps = step(self.suns, angle, depth, begins, ends)
