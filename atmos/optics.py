@@ -114,10 +114,16 @@ def above(scene: Scene, altitude: Length) -> Float[Array, "medium"]:
     return densities(scene, scene.geometry.locate(position))
 
 
-def layers(scene: Scene, extinction: Float[Array, "medium wl"], count: int) -> Layers:
+def layers(
+    scene: Scene,
+    extinction: Float[Array, "medium wl"],
+    count: int,
+    even: float = 0.5,
+) -> Layers:
     """Cuts the air into `count` layers, thin where light changes fast.
 
-    No profile has an edge within a layer. Raises `ValueError` if there are more edges
+    The more `even` they are to be, the more altitude itself counts beside that. No
+    profile has an edge within a layer. Raises `ValueError` if there are more edges
     than layers.
     """
     edges = _edges(scene)
@@ -127,7 +133,7 @@ def layers(scene: Scene, extinction: Float[Array, "medium wl"], count: int) -> L
             f"`layers` must be at least {edges.shape[0] - 1}, for so many edges of "
             f"media; got {count}."
         )
-    inner = _crowded(scene, edges, extinction, spare)
+    inner = _crowded(scene, edges, extinction, spare, even)
     altitude = jnp.sort(jnp.concatenate([edges, inner]))
     return Layers(altitude, _columns(scene, altitude[:-1], jnp.diff(altitude), 6))
 
@@ -167,6 +173,7 @@ def _crowded(
     edges: Float[Array, "edge"],
     extinction: Float[Array, "medium wl"],
     count: int,
+    even: float,
 ) -> Float[Array, "count"]:
     """Altitudes with as much between any two of them of what light may notice.
 
@@ -189,7 +196,7 @@ def _crowded(
     thick = whole * jnp.max(extinction, 1, initial=0.0)
     weight = jnp.where(whole > 0.0, thick / (thick + _THIN), 0.0)
     weight = weight / jnp.where(whole > 0.0, whole, 1.0)
-    amount = 1.5 * step / edges[-1] + 0.5 * logarithm
+    amount = even * step / edges[-1] + 0.5 * logarithm
     amount += jnp.einsum("pim,m->pi", column, weight, precision="highest")
     total = jnp.cumsum(amount)
     total = jnp.concatenate([jnp.zeros_like(total[:1]), total])

@@ -11,6 +11,7 @@ from jaxtyping import Array, Float, Int
 from ..quantity import Fraction
 from ..transport import contract
 from ._harmonics import harmonics, pairs, spin_harmonics
+from ._levels import Bends
 from ._once import Once
 from ._rays import Rays
 from ._step import step, Suns
@@ -32,16 +33,15 @@ class Sweep(eqx.Module):
 
     `turned` is the single-scattering albedo of each layer times the moments of its
     phase function, `polarised` that times those of polarisation, `up` and `down` are
-    optical depths of steps. What four levels around a layer weigh in its midst, beyond
-    the mean of the middle ones, are `bends`. The logarithm of what light is told
-    relative to is `reference`. Light is I, or I, Q and U where `stokes` is 3.
+    optical depths of steps. The logarithm of what light is told relative to is
+    `reference`. Light is I, or I, Q and U where `stokes` is 3.
     """
 
     rays: Rays
     suns: Suns
     up: Float[Array, "layer ray wl"]
     down: Float[Array, "layer ray wl"]
-    bends: Float[Array, "layer 4 wl"]
+    bends: Bends
     turned: Float[Array, "layer l wl"]
     polarised: Float[Array, "layer k 3 wl"]
     albedo: Fraction
@@ -57,7 +57,9 @@ class Sweep(eqx.Module):
         return self._carry(None, once)
 
     def _carry(self, moments: Array | None, once: Once | None) -> Light:
-        bent = None if moments is None else self._bent(moments)
+        bent = None
+        if moments is not None:
+            bent = self.bends.midst(moments, self.reference)
         falls, kept = self._fall(moments, bent, once)
         shines = falls.down[0]
         if once is not None:
@@ -65,16 +67,6 @@ class Sweep(eqx.Module):
         shines *= self.albedo[None]
         rises = self._rise(moments, bent, once, kept, shines)
         return jax.tree.map(jnp.add, falls, rises)
-
-    def _bent(
-        self, moments: Float[Array, "level row sun wl"]
-    ) -> Float[Array, "layer row sun wl"]:
-        """By how much the midst of each layer has more than its faces on average."""
-        layers = len(self.turned)
-        around = jnp.pad(moments, ((1, 1), (0, 0), (0, 0), (0, 0)), mode="edge")
-        return sum(
-            self.bends[:, i, None, None] * around[i : i + layers] for i in range(4)
-        )
 
     def _fall(
         self, moments: Array | None, bent: Array | None, once: Once | None

@@ -17,7 +17,7 @@ from ._base import check_stokes
 from ._diffuse import AbstractDiffuse, Diffused
 from ._field import Field
 from ._krylov import fixed_point
-from ._levels import bends
+from ._levels import Bends
 from ._once import Once
 from ._peaks import Peaks
 from ._rays import rays
@@ -118,7 +118,7 @@ class Shells(AbstractDiffuse):
         self, scene: Scene, wavelength: Wavelength, mixed: Mixture
     ) -> tuple[Sweep, Once]:
         """How light is carried, for a reference that is everywhere 1."""
-        cut = layers(scene, mixed.extinction, self.layers)
+        cut = layers(scene, mixed.extinction, self.layers, _EVEN)
         lines = rays(scene, cut, self.grounded)
         # Suns crowd where they set for the air, and there is night up to the nadir.
         dip = scene.geometry.dip(scene.top, jnp.zeros_like(scene.top))
@@ -136,7 +136,7 @@ class Shells(AbstractDiffuse):
             suns=suns,
             up=through(lines.up),
             down=through(lines.down),
-            bends=bends(depth[:, 0]),
+            bends=Bends.of(depth[:, 0]),
             turned=within(mixed.scattering) * share,
             polarised=within(mixed.polarised) * share[:, None],
             albedo=jnp.broadcast_to(ground, wavelength.shape),
@@ -147,6 +147,8 @@ class Shells(AbstractDiffuse):
         return start, Once(scene, mixed, lines, sunlight(scene), *stands)
 
 
+# Each layer has a line that turns round in it: so there are some where air is thin too.
+_EVEN = 1.5
 # What the logarithm of brightness at most loses from one sun to the next, and while the
 # sun sinks by as much as the top of the air sees below level. Light that turned once
 # ends at twice that, and other light does not: relative to what is so much darker than
