@@ -39,9 +39,9 @@ CASE = traced.Case("rao", 60.0, 0.0)
 # is reached, in the round until that of the peer is, at each of its settings.
 FLAT = {
     "PythonicDISORT": (50.0, [0.1, 0.05, 0.03]),
-    "nanodisort": (10.0, [1e-2, 1e-3, 5e-4]),
+    "nanodisort": (20.0, [1e-2, 1e-3, 5e-4]),
 }
-ROUND = {"sasktran2": 15.0}
+ROUND = {"sasktran2": 20.0}
 
 
 class Run(NamedTuple):
