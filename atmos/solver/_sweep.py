@@ -57,21 +57,24 @@ class Sweep(eqx.Module):
         return self._carry(None, once)
 
     def _carry(self, moments: Array | None, once: Once | None) -> Light:
-        bent = None
+        known = None
         if moments is not None:
-            bent = self.bends.midst(moments, self.reference)
-        falls, kept = self._fall(moments, bent, once)
+            known = moments, self.bends.midst(moments, self.reference)
+        falls, kept = self._fall(known, once)
         shines = falls.down[0]
         if once is not None:
             shines += once.ground() * jnp.exp(-self.reference[0])[:, None]
         shines *= self.albedo[None]
-        rises = self._rise(moments, bent, once, kept, shines)
+        rises = self._rise(known, once, kept, shines)
         return jax.tree.map(jnp.add, falls, rises)
 
     def _fall(
-        self, moments: Array | None, bent: Array | None, once: Once | None
+        self, known: tuple[Array, Array] | None, once: Once | None
     ) -> tuple[Light, Float[Array, "layer stokes azimuth sun wl"]]:
-        """What comes down; and what of it turns round in each layer, at its top."""
+        """What comes down; and what of it turns round in each layer, at its top.
+
+        Of light that is known by its moments at levels, and more half way.
+        """
         rays = self.rays
         size = rays.cosine.shape[1], self.reference.shape[1]
 
@@ -81,7 +84,8 @@ class Sweep(eqx.Module):
             begins, ends = (jnp.broadcast_to(y, size) for y in (begins, ends))
             here = self._basis(rays.cosine[i])[0]
             sources = None
-            if moments is not None:
+            if known is not None:
+                moments, bent = known
                 above = self._basis(rays.cosine[i + 1])[0]
                 sources = (
                     _source(above, turned, moments[i + 1]),
@@ -108,8 +112,7 @@ class Sweep(eqx.Module):
 
     def _rise(
         self,
-        moments: Array | None,
-        bent: Array | None,
+        known: tuple[Array, Array] | None,
         once: Once | None,
         kept: Float[Array, "layer stokes azimuth sun wl"],
         shines: Float[Array, "sun wl"],
@@ -129,7 +132,8 @@ class Sweep(eqx.Module):
             begins, ends = (jnp.broadcast_to(y, size) for y in (begins, ends))
             ahead, here = self._basis(rays.cosine[i + 1])
             sources = None
-            if moments is not None:
+            if known is not None:
+                moments, bent = known
                 below = self._basis(rays.cosine[i])[1]
                 far = _source(below, turned, moments[i])
                 one = lambda x: x[:, turns][:, None]
