@@ -117,6 +117,22 @@ def test_without_a_sun_all_is_dark(geometry):
     assert not np.any(sky.panorama(place).radiance(view[2:, None], view[:1, None]))
 
 
+@pytest.mark.parametrize("geometry", [Flat(), Spherical(6.4e6)])
+def test_a_panorama_from_the_ground_is_what_each_look_sees(geometry):
+    numbers = (jnp.asarray(x) for x in (0.3, 0.9, 0.7, 0.6, 0.3, 0.5))
+    solver = Columns(streams=8, layers=8, suns=4)
+    sky = solve(world(geometry, *numbers), solver, NM)
+    zenith, azimuth = np.deg2rad([5.0, 50.0, 80.0, 88.0, 100.0, 170.0]), AZIMUTHS
+    angles = jnp.asarray(zenith)[:, None], jnp.asarray(azimuth)[None]
+    found = sky.panorama(jnp.zeros(3)).radiance(*angles)
+    level = (
+        np.sin(zenith)[:, None] * np.stack([np.sin(azimuth), np.cos(azimuth)])[:, None]
+    )
+    views = np.stack([*level, np.cos(zenith)[:, None] + 0.0 * level[0]], -1)
+    see = jax.jit(jax.vmap(jax.vmap(lambda x: sky.radiance(jnp.zeros(3), x))))
+    np.testing.assert_allclose(found, see(jnp.asarray(views)), rtol=1e-3)
+
+
 @pytest.mark.parametrize("depth", [30.0, 100.0, 1000.0])
 def test_thick_clouds_pass_as_much_as_diffusion_theory_says(depth):
     # Exact up to exp(-depth), van de Hulst 1980: 4/3 K(1) / (depth + 2 * 0.7104461),
