@@ -19,7 +19,7 @@ from ._flight import cell, Flight, Layers, NODES, share
 # The shares of flights to where it is guessed to be bright, and of turns towards where
 # light is guessed to come from. The rest are as if all air were equally bright: a poor
 # guess makes no path much rarer than that.
-_FLIGHTS, _TURNS = 0.8, 0.4
+_FLIGHTS, _TURNS = 0.8, 0.8
 # So many orders are led. Small faults of the guess would else pile up to large weights.
 _LED = 8
 
@@ -177,7 +177,6 @@ def depart(
     up, sun = place.point.up, task.light.direction
     layers = task.layers
     whence = layers.whence[layers.shell(place.piece), cell(dot(up, sun))]
-    count = whence.shape[0]
     where = task.scene, task.wavelength
     apart = turn(*where, place.mixture, hero, u[0], key)
     cosine = jnp.where(place.grounded, jnp.sqrt(u[1]), 1.0 - apart)
@@ -190,14 +189,16 @@ def depart(
     turned = turned / jnp.sqrt(dot(turned, turned))
 
     upto = jnp.cumsum(whence[:, hero])
-    chosen = jnp.minimum(jnp.sum(upto <= u[0] * upto[-1]), count - 1)
+    chosen = jnp.sum(upto <= u[0] * upto[-1])
+    chosen = jnp.minimum(chosen, whence.shape[0] - 1)
     # What turns little goes where the guess points too seldom to be led there.
     spread = 1.0 - jnp.sum(place.mixture * layers.forward, 0)
     led = jnp.where(order < _LED, _TURNS * spread * spread, 0.0)
     guided = ~place.grounded & (u[3] < led[hero])
     direction = jnp.where(guided, directions.draw(chosen, u[1:3], up, sun), turned)
     turns = phase(*where, place.mixture, versine(along, direction))
-    known = whence[directions.sort(direction, up, sun)] * (count * 0.25 / math.pi)
+    ahead = directions.sort(direction, up, sun)
+    known = whence[ahead] / directions.solid_angle(ahead, up.dtype)
     chance = turns + led * (known - turns)
     falls = jnp.maximum(dot(up, direction), 0.0) / math.pi
     return direction, jnp.where(place.grounded, falls, chance)

@@ -17,7 +17,7 @@ from ._flight import brightness, fly, Layers, SUNS, to_sun
 # Shells besides those of the media.
 _SHELLS = 20
 # How often the guess is improved, and how far it falls at most below what arrives.
-_ROUNDS, _LEAST = 4, 0.5
+_ROUNDS, _LEAST = 3, 0.5
 
 
 def prepare(scene: Scene, wavelength: Wavelength) -> Layers:
