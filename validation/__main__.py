@@ -42,7 +42,7 @@ PARTS = {
     "orders": Part("All orders in the round", True, traced=True),
     "derivatives": Part("Slopes of radiance", True),
     "multiple_scattering": Part(
-        "Path tracing itself", True, True, more=("--slabs", "500")
+        "Path tracing itself", True, True, more=("--slabs", "250")
     ),
     "polarisation": Part("Polarised light", True, True),
     "volumes": Part("Clouds and smoke", True, True),

@@ -264,6 +264,11 @@ def rays(cosines, azimuths) -> np.ndarray:
     return np.stack(found, -1).astype(np.float32)
 
 
+# Rays of a flux are spread evenly in each of so many sets, which tell its error. They
+# are as many near the horizon, where the light is that few rays would find.
+SETS = 25
+
+
 def slab_fluxes(folder: pathlib.Path, count: int) -> Iterator[tuple[float, float]]:
     """z-scores and relative standard errors of reflected and transmitted fluxes."""
     lines = (folder / "slab_reflectance_transmittance_hg.csv").read_text().splitlines()
@@ -274,13 +279,16 @@ def slab_fluxes(folder: pathlib.Path, count: int) -> Iterator[tuple[float, float
         through = float(row["T_total"]) - float(row["T_direct"])
         truth.setdefault((depth, g, cosine), {})[albedo] = float(row["R"]), through
     random = np.random.default_rng(3)
+    each = max(count // SETS, 1)
     for (depth, g, cosine), values in truth.items():
         albedos = sorted(values)
         wavelength = (400.0 + np.arange(len(albedos))).astype(np.float32)
-        share = random.uniform(size=(2, count))
-        turns = random.uniform(0.0, 2.0 * math.pi, (2, count))
-        directions = rays(np.sqrt(share) * [[-1.0], [1.0]], turns)
-        altitudes = np.repeat([1.0, 0.0], count).astype(np.float32)
+        # Roberts' sequence, shifted by chance.
+        shifts = random.uniform(size=(2, SETS, 1, 2))
+        places = (shifts + np.arange(each)[:, None] * [0.7548776662, 0.5698402910]) % 1
+        rise, turns = places.reshape(2, -1, 2).transpose(2, 0, 1)
+        directions = rays(rise * [[-1.0], [1.0]], 2.0 * math.pi * turns)
+        altitudes = np.repeat([1.0, 0.0], SETS * each).astype(np.float32)
         scene = slab(depth, albedos, phase.HenyeyGreenstein(g), cosine)
         found = across_slab(
             scene,
@@ -288,8 +296,10 @@ def slab_fluxes(folder: pathlib.Path, count: int) -> Iterator[tuple[float, float
             jnp.asarray(altitudes),
             jnp.asarray(directions.reshape(-1, 3)),
         )
-        found = np.asarray(found, float).reshape(2, count, -1) * (math.pi / cosine)
-        error = found.std(1, ddof=1) / math.sqrt(count)
+        found = np.asarray(found, float).reshape(2, SETS * each, -1)
+        found = found * (2.0 * math.pi / cosine * rise[:, :, None])
+        found = found.reshape(2, SETS, each, -1).mean(2)
+        error = found.std(1, ddof=1) / math.sqrt(SETS)
         right = np.array([values[x] for x in albedos]).T
         # Less than a millionth comes through so rarely that no error is to be had.
         kept = right > 1e-6
