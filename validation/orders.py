@@ -4,7 +4,7 @@ Errors beyond two standard errors of the truth, relative, of 456 directions from
 ground down to a degree above the horizon, in five colours; means over the directions.
 The truth is a file that `validation.multiple_scattering --out` wrote. What it lacks is
 traced into it, by 2048 paths a direction unless `--samples` says otherwise, in twilight
-by eight times as many: to half a percent by day, in twenty minutes of processor time.
+by eight times as many: to half a percent by day, in forty minutes of processor time.
 With so few the noise hides what is less than itself; `--samples 262144` on a GPU leaves
 a thousandth.
 
