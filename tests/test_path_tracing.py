@@ -14,7 +14,14 @@ from atmos.medium import Ball, Exponential, Medium, of_extinction, Tent, Uniform
 from atmos.phase import HenyeyGreenstein, Isotropic, Rayleigh
 from atmos.quantity import deg
 from atmos.scene import Scene
-from atmos.solver import estimate, PathTracing, SingleScattering, solve, Tally
+from atmos.solver import (
+    _directions,
+    estimate,
+    PathTracing,
+    SingleScattering,
+    solve,
+    Tally,
+)
 from atmos.spectrum import Constant, PowerLaw, Tabulated
 
 
@@ -304,6 +311,24 @@ def test_slopes_are_refused(mode):
     thick = slab(1.0, 0.9, 0.5, 0.5)
     with pytest.raises(RuntimeError, match="`PathTracing` has no gradients; `Single"):
         mode(look)(jnp.array(1.0))
+
+
+@pytest.mark.parametrize("sun", [[0.0, 0.6, -0.8], [0.0, 0.0, 1.0]])
+def test_cells_of_directions_are_the_sphere(sun):
+    """What is drawn from a cell lies in it, and by their sizes all is even."""
+    up, sun = jnp.array([0.48, 0.6, 0.64]), jnp.array(sun)
+    _, shares = _directions.views(up.dtype)
+    cells = jnp.arange(len(shares), dtype=jnp.int32)
+    sizes = jax.vmap(lambda x: _directions.solid_angle(x, up.dtype))(cells)
+    np.testing.assert_allclose(sizes, 4.0 * np.pi * shares, rtol=1e-12)
+    assert float(jnp.sum(shares)) == pytest.approx(1.0, rel=1e-12)
+    u = jax.random.uniform(jax.random.key(0), (len(cells), 64, 2), up.dtype)
+    draw = jax.vmap(lambda i, u: _directions.draw(i, u, up, sun), (None, 0))
+    found = jax.vmap(draw)(cells, u)
+    sort = jax.vmap(jax.vmap(lambda x: _directions.sort(x, up, sun)))
+    assert np.all(sort(found) == cells[:, None])
+    spread = jnp.einsum("c,cni,cnj->ij", shares / 64.0, found, found)
+    np.testing.assert_allclose(spread, np.eye(3) / 3.0, atol=0.01)
 
 
 SHARE, LOBE = within(0.0, 1.0), within(-0.99, 0.99, 0.0)
