@@ -28,9 +28,7 @@ from .claim import Claim, main
 
 # Suns, in degrees from the zenith, and the mean error that is promised for them.
 PROMISED = {
-    "Shells": {
-        **{30: 5e-4, 60: 5e-4, 80: 5e-4, 88: 5e-4, 92: 5e-4, 96: 2e-3, 102: 5e-3}
-    },
+    "Shells": dict.fromkeys((30, 60, 80, 88, 92), 5e-4) | {96: 2e-3, 102: 5e-3},
     "Bruneton": {30: 2e-3, 60: 2e-3, 80: 2e-3, 88: 6e-3, 92: 0.03, 96: 0.05},
     "Columns": {30: 0.007, 60: 0.007, 80: 0.014},
     "Shared": {30: 0.04, 60: 0.04, 80: 0.05, 88: 0.09, 92: 0.09},
