@@ -183,8 +183,9 @@ def test_what_is_not_absorbed_leaves():
     assert leaves == pytest.approx(met, rel=2.5e-4)
 
 
-# Small, to have slopes; in fewer layers those of how bright it is itself are missed.
-SMALL = Shells(layers=24, grounded=4, azimuths=4, degrees=4, suns=24)
+# Small, to have slopes; in fewer layers those of how bright it is itself are missed,
+# and no line passes so near to the top that its way there is next to nothing.
+SMALL = Shells(layers=32, grounded=4, azimuths=4, degrees=4, suns=24)
 
 
 @eqx.filter_jit
@@ -215,6 +216,14 @@ def test_a_fixed_point_has_exact_slopes():
     due = lambda x: jnp.linalg.solve(jnp.eye(2) - x * matrix, first).sum()
     slopes = [jax.grad(f)(0.9) for f in (found, due)]
     assert float(slopes[0]) == pytest.approx(float(slopes[1]), rel=1e-9)
+
+
+def test_slopes_of_a_fixed_point_that_are_not_known_are_not_zero():
+    """A square root has no slope at 0."""
+    found = lambda x: fixed_point(lambda y: 0.5 * y, jnp.sqrt(x), 1e-9, 50)[0]
+    look = lambda x: jax.jvp(found, (jnp.array([x]),), (jnp.array([x]),))
+    np.testing.assert_allclose(look([4.0]), [[[4.0]], [[2.0]]])
+    np.testing.assert_allclose(look([0.0]), [[[0.0]], [[math.nan]]])
 
 
 def test_what_is_not_round_or_not_layered_is_refused():

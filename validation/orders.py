@@ -88,6 +88,13 @@ def claims(arguments: argparse.Namespace) -> Iterator[Claim]:
                 text = f"{name}, {scene_name}, sun {zenith}: mean beyond noise"
                 yield Claim(text, source, bar, off.mean())
                 yield Claim("    largest", source, None, off.max())
+                # What it has too little of, all directions taken together.
+                lacks = np.mean(right / found, 0) - 1.0
+                worst = np.argmax(np.abs(lacks))
+                spread = np.sqrt(np.sum((error / found) ** 2, 0)) / len(found)
+                source = f"paths, to {spread[worst]:.2g}"
+                text = "    what all directions lack, in the worst of five colours"
+                yield Claim(text, source, None, lacks[worst])
 
 
 if __name__ == "__main__":

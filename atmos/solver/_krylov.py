@@ -25,7 +25,7 @@ def fixed_point(
     `carry` must not mix. Found in no more than `most` steps, by generalised conjugate
     residuals without the oldest directions (Orthomin; Eisenstat, Elman and Schultz
     1983, SIAM Journal on Numerical Analysis 20(2)). Differentiable at no more than the
-    price of another solution.
+    price of another solution. Where `first` has what is not a number, all is not one.
     """
     less = lambda x: jax.tree.map(operator.sub, x, carry(x))
     solve = lambda apply, b: _conjugate_residuals(apply, b, tolerance, most)
@@ -62,7 +62,10 @@ def _conjugate_residuals(
     none = jax.tree.map(lambda x: jnp.zeros((_KEPT, *x.shape), x.dtype), first)
     start = jnp.zeros((), jnp.int32), zeros, first, none, none
     _, x, residual, _, _ = jax.lax.while_loop(goes_on, advance, start)
-    return x, error(residual)
+    missing = error(residual)
+    # No step was taken for what is not a number; nothing would pass for its slope.
+    known = jnp.where(jnp.isnan(missing), missing, 1.0)
+    return jax.tree.map(lambda y: _scaled(y, known), x), missing
 
 
 def _product(x: T, y: T) -> Float[Array, "wl"]:

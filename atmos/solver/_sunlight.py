@@ -62,8 +62,9 @@ class Sunlight(eqx.Module):
 
 def _reach(radius, top, x, low):
     """How far along a line the air reaches, from the ground or the lowest place."""
-    far = jnp.sqrt(x * x + (top - low) * (top + low + 2.0 * radius))
-    return jnp.maximum(far - x, 1e-6 * top)
+    least = 1e-6 * top
+    squared = x * x + (top - low) * (top + low + 2.0 * radius)
+    return jnp.maximum(jnp.sqrt(jnp.maximum(squared, least * least)) - x, least)
 
 
 def sunlight(scene: Scene) -> Sunlight:

@@ -148,7 +148,7 @@ class Shells(AbstractDiffuse):
 
 
 # Each layer has a line that turns round in it: so there are some where air is thin too.
-_EVEN = 1.5
+_EVEN = 4.5
 # What the logarithm of brightness at most loses from one sun to the next, and while the
 # sun sinks by as much as the top of the air sees below level. Light that turned once
 # ends at twice that, and other light does not: relative to what is so much darker than
