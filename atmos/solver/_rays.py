@@ -60,9 +60,10 @@ def rays(scene: Scene, cut: Layers, grounded: int) -> Rays:
     ahead = jnp.concatenate([inner, outer], 1)
     nearest = jnp.concatenate([radius * jnp.sqrt((1.0 - x) * (1.0 + x)), radius + low])
     cosine = ahead / (radius + h)
-    horizon = jnp.sqrt(h * (h + 2.0 * radius)) / (radius + h)
+    dip = lambda x: scene.geometry.dip(x, jnp.zeros_like(x))
+    horizon = jnp.sin(jax.vmap(dip)(altitude))[:, None]
     inner = (radius / (radius + h)) ** 2 * (x * w)[None] / cosine[:, :grounded]
-    plain = jnp.concatenate([inner, _limb(cosine[:, grounded:], horizon)], 1)
+    inner = _mended(cosine[:, :grounded], horizon, inner)
 
     begin, end = ahead[:-1], ahead[1:]
     chord = (h[1:] - h[:-1]) * (h[1:] + h[:-1] + 2.0 * radius)
@@ -74,7 +75,7 @@ def rays(scene: Scene, cut: Layers, grounded: int) -> Rays:
         altitude,
         ahead,
         cosine,
-        _mended(cosine, plain),
+        jnp.concatenate([inner, _limb(cosine[:, grounded:], horizon)], 1),
         _steps(scene, altitude[1:], end, nearest, straight),
         _steps(scene, altitude[1:], end, nearest, through),
         grounded,
@@ -114,25 +115,33 @@ def radius_of(scene: Scene) -> Length:
     return geometry.radius
 
 
-# Polynomials that sums over lines integrate exactly have a lower degree.
-_DEGREE = 4
+# Polynomials that sums over lines which meet the ground integrate exactly have a lower
+# degree: the ground's cosines alone miss that others change fast near the horizon.
+_DEGREE = 8
 
 
 def _mended(
-    cosine: Float[Array, "level ray"], plain: Float[Array, "level ray"]
-) -> Float[Array, "level ray"]:
-    """The weights next to some for which low polynomials are integrated exactly."""
-    basis = [jnp.ones_like(cosine), 2.0 * cosine - 1.0]
-    for n in range(2, _DEGREE):
-        ahead = (2 * n - 1) * basis[1] * basis[-1]
+    cosine: Float[Array, "level line"],
+    horizon: Float[Array, "level 1"],
+    plain: Float[Array, "level line"],
+) -> Float[Array, "level line"]:
+    """The weights next to some for which low polynomials are integrated exactly.
+
+    From the horizon to straight up or down.
+    """
+    count = min(_DEGREE, cosine.shape[1])
+    width = 1.0 - horizon
+    across = 2.0 * (cosine - horizon) / width - 1.0
+    basis = [jnp.ones_like(across), across]
+    for n in range(2, count):
+        ahead = (2 * n - 1) * across * basis[-1]
         basis.append((ahead - (n - 1) * basis[-2]) / n)
-    basis = jnp.stack(basis, 1)  # level, degree, ray
-    whole = jnp.asarray(np.arange(_DEGREE) == 0, cosine.dtype)[None]
+    basis = jnp.stack(basis[:count], 1)  # level, degree, line
+    whole = jnp.asarray(np.arange(count) == 0, cosine.dtype)[None] * width
     missing = whole - contract("idk,ik->id", basis, plain)
-    size = jnp.maximum(plain, 0.0)
-    gram = contract("idk,iek,ik->ide", basis, basis, size)
+    gram = contract("idk,iek,ik->ide", basis, basis, plain)
     lift = jnp.linalg.solve(gram, missing[..., None])[..., 0]
-    return plain + size * contract("idk,id->ik", basis, lift)
+    return plain + plain * contract("idk,id->ik", basis, lift)
 
 
 def _limb(
@@ -140,8 +149,9 @@ def _limb(
 ) -> Float[Array, "level line"]:
     """Weights of lines in the limb, from level to the horizon.
 
-    By cubics between each two of them, with the slopes of parabolas at both ends, and
-    straight lines beyond the outermost. Cosines fall, and are 0 of lines that are not.
+    Of what is seen upwards and downwards together, which goes on evenly through level:
+    by cubics between each two of them, with the slopes of parabolas at both ends, and a
+    straight line before the first. Cosines fall, and are 0 of lines that are not.
     """
     there = cosine > 0.0
     step = jnp.where(there[:, 1:], cosine[:, :-1] - cosine[:, 1:], 0.0)
@@ -150,19 +160,18 @@ def _limb(
     after = jnp.concatenate([step, none], 1)
     first = jnp.asarray(np.arange(cosine.shape[1]) == 0)[None]
     last = there & (after == 0.0)
+    after = jnp.where(last, 2.0 * cosine, after)  # to the same line, seen downwards
     ahead = jnp.where(there & first, horizon - cosine, 0.0)
-    behind = jnp.where(last, cosine, 0.0)
 
     # The slope at a line, from those before and after it.
     over = lambda x: jnp.where(x > 0.0, 1.0 / jnp.where(x > 0.0, x, 1.0), 0.0)
-    alone = (before == 0.0) | (after == 0.0)
     both = over(before + after)
-    rest = jnp.where(alone, -over(before), -after * over(before) * both)
-    next = jnp.where(alone, over(after), before * over(after) * both)
+    rest = -after * over(before) * both
+    next = jnp.where(before == 0.0, over(after), before * over(after) * both)
+    next = jnp.where(last, 0.0, next)
     # What slopes do to the whole.
-    share = (after * after - before * before) / 12.0
-    share += 0.5 * (behind * behind - ahead * ahead)
-    weight = 0.5 * (before + after) + ahead + behind - share * (rest + next)
+    share = (after * after - before * before) / 12.0 - 0.5 * ahead * ahead
+    weight = 0.5 * (before + after) + ahead - share * (rest + next)
     weight += jnp.concatenate([(share * rest)[:, 1:], none], 1)
     weight += jnp.concatenate([none, (share * next)[:, :-1]], 1)
     return jnp.where(there, weight, 0.0)

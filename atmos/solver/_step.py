@@ -19,7 +19,7 @@ class Suns(eqx.Module):
     """Where the sun may stand: zenith angles, and azimuths of what one sees from its.
 
     Azimuths are the midpoints of half a circle; the other half mirrors it. Where
-    `rough`, straight lines join zenith angles, which never fall below what they join.
+    `rough`, straight lines join both, which never fall below what they join.
     """
 
     zenith: RoundSuns
@@ -42,8 +42,10 @@ class Suns(eqx.Module):
         y = jnp.abs(sine * jnp.sin(azimuth) * jnp.ones_like(c)) + _SLIVER
         level = jnp.sqrt(x * x + y * y)
         sun, step = self.zenith.place(jnp.arctan2(level, z))
-        by_sun = jnp.where(self.rough, straight(step), cubic(step))
-        return Elsewhere(sun, by_sun, *self._between(jnp.arctan2(y, x)))
+        return Elsewhere(sun, self._weights(step), *self._between(jnp.arctan2(y, x)))
+
+    def _weights(self, step: Float[Array, "*n"]) -> Float[Array, "*n 4"]:
+        return jnp.where(self.rough, straight(step), cubic(step))
 
     def _between(
         self, azimuth: Float[Array, "ray azimuth sun"]
@@ -62,7 +64,7 @@ class Suns(eqx.Module):
         beyond = (index < 0) | (index >= count)
         index = jnp.where(index < 0, -1 - index, index)
         index = jnp.where(index >= count, 2 * count - 1 - index, index)
-        weights = cubic(t - first + 1.0)
+        weights = self._weights(t - first + 1.0)
         side = jnp.where(beyond, -jnp.ones_like(weights), 1.0)
         return jnp.clip(index, 0, count - 1), weights, side
 
