@@ -15,10 +15,12 @@ from scipy.interpolate import CubicSpline
 from atmos.geometry import Flat, Spherical
 from atmos.light import Sun
 from atmos.medium import Ball, Exponential, Medium
+from atmos.optics import layers
 from atmos.phase import HenyeyGreenstein, Rayleigh
 from atmos.scene import Scene
 from atmos.solver import Columns, Shells, SingleScattering, solve
 from atmos.solver._krylov import fixed_point
+from atmos.solver._rays import rays
 
 
 NM = np.array([500.0])
@@ -180,7 +182,23 @@ def test_what_is_not_absorbed_leaves():
     depth = np.trapezoid(np.where(height < TOP, density, 0.0), along, axis=1)
     passed = np.trapezoid(2.0 * (RADIUS + above) * np.exp(-depth), above)
     met = 1.0 - passed / (RADIUS + TOP) ** 2
-    assert leaves == pytest.approx(met, rel=2.5e-4)
+    assert leaves == pytest.approx(met, rel=2e-5)
+
+
+def test_sums_over_lines_are_integrals():
+    """At every level, over what is seen downwards or upwards, which is alike."""
+    scene = numbers()
+    extinction = jnp.stack([x.extinction(jnp.asarray(NM)) for x in scene.media])
+    lines = rays(scene, layers(scene, extinction, 40, 4.5), 10)
+    cosine, weight = np.asarray(lines.cosine), np.asarray(lines.weight)
+    near_level = 0.1 * math.sqrt(math.pi) * math.erf(5.0)
+    for f, due, off in [
+        (np.ones_like, 1.0, 1e-14),
+        (np.square, 1.0 / 3.0, 1e-6),
+        (lambda x: np.exp(-((x / 0.2) ** 2)), near_level, 5e-4),
+    ]:
+        found = np.sum(weight * f(cosine), 1)
+        np.testing.assert_allclose(found, due, rtol=off)
 
 
 # Small, to have slopes; in fewer layers those of how bright it is itself are missed,
