@@ -186,19 +186,25 @@ def test_what_is_not_absorbed_leaves():
 
 
 def test_sums_over_lines_are_integrals():
-    """At every level, over what is seen downwards or upwards, which is alike."""
+    """At every level, over what is seen downwards or upwards, which is alike.
+
+    Of layers some have no thickness, at the ground, at the top and in between.
+    """
     scene = numbers()
     extinction = jnp.stack([x.extinction(jnp.asarray(NM)) for x in scene.media])
-    lines = rays(scene, layers(scene, extinction, 40, 4.5), 10)
-    cosine, weight = np.asarray(lines.cosine), np.asarray(lines.weight)
+    cut = layers(scene, extinction, 40, 4.5)
+    thrice = jnp.sort(jnp.concatenate([cut.altitude, cut.altitude[::20].repeat(2)]))
     near_level = 0.1 * math.sqrt(math.pi) * math.erf(5.0)
-    for f, due, off in [
-        (np.ones_like, 1.0, 1e-14),
-        (np.square, 1.0 / 3.0, 1e-6),
-        (lambda x: np.exp(-((x / 0.2) ** 2)), near_level, 5e-4),
-    ]:
-        found = np.sum(weight * f(cosine), 1)
-        np.testing.assert_allclose(found, due, rtol=off)
+    for one in (cut, dataclasses.replace(cut, altitude=thrice)):
+        lines = rays(scene, one, 10)
+        cosine, weight = np.asarray(lines.cosine), np.asarray(lines.weight)
+        for f, due, off in [
+            (np.ones_like, 1.0, 1e-14),
+            (np.square, 1.0 / 3.0, 1e-6),
+            (lambda x: np.exp(-((x / 0.2) ** 2)), near_level, 5e-4),
+        ]:
+            found = np.sum(weight * f(cosine), 1)
+            np.testing.assert_allclose(found, due, rtol=off)
 
 
 # Small, to have slopes; in fewer layers those of how bright it is itself are missed,

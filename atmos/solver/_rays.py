@@ -159,15 +159,15 @@ def _limb(
     before = jnp.concatenate([none, step], 1)
     after = jnp.concatenate([step, none], 1)
     first = jnp.asarray(np.arange(cosine.shape[1]) == 0)[None]
-    last = there & (after == 0.0)
+    last = there & ~jnp.concatenate([there[:, 1:], none > 0.0], 1)
     after = jnp.where(last, 2.0 * cosine, after)  # to the same line, seen downwards
     ahead = jnp.where(there & first, horizon - cosine, 0.0)
 
-    # The slope at a line, from those before and after it.
+    # The slope at a line, from those before and after it if there are two elsewhere.
     over = lambda x: jnp.where(x > 0.0, 1.0 / jnp.where(x > 0.0, x, 1.0), 0.0)
     both = over(before + after)
-    rest = -after * over(before) * both
-    next = jnp.where(before == 0.0, over(after), before * over(after) * both)
+    rest = -over(before) * jnp.where(after > 0.0, after * both, 1.0)
+    next = over(after) * jnp.where(before > 0.0, before * both, 1.0)
     next = jnp.where(last, 0.0, next)
     # What slopes do to the whole.
     share = (after * after - before * before) / 12.0 - 0.5 * ahead * ahead
