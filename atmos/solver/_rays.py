@@ -144,6 +144,10 @@ def _mended(
     return plain + plain * contract("idk,id->ik", basis, lift)
 
 
+# The share of the way between two lines that sets a third apart from either.
+_SLIM = 1e-3
+
+
 def _limb(
     cosine: Float[Array, "level line"], horizon: Float[Array, "level 1"]
 ) -> Float[Array, "level line"]:
@@ -163,11 +167,15 @@ def _limb(
     after = jnp.where(last, 2.0 * cosine, after)  # to the same line, seen downwards
     ahead = jnp.where(there & first, horizon - cosine, 0.0)
 
-    # The slope at a line, from those before and after it if there are two elsewhere.
+    # The slope at a line, from those before and after it; from one of them where the
+    # other is the line itself, nearly, as of layers without thickness.
     over = lambda x: jnp.where(x > 0.0, 1.0 / jnp.where(x > 0.0, x, 1.0), 0.0)
     both = over(before + after)
-    rest = -over(before) * jnp.where(after > 0.0, after * both, 1.0)
-    next = over(after) * jnp.where(before > 0.0, before * both, 1.0)
+    to_one, to_other = before * both, after * both
+    rest = jnp.where(to_one > _SLIM, -to_other * over(before), 0.0)
+    rest = jnp.where(to_other > _SLIM, rest, -over(before))
+    next = jnp.where(to_other > _SLIM, to_one * over(after), 0.0)
+    next = jnp.where(to_one > _SLIM, next, over(after))
     next = jnp.where(last, 0.0, next)
     # What slopes do to the whole.
     share = (after * after - before * before) / 12.0 - 0.5 * ahead * ahead

@@ -89,7 +89,8 @@ class Shells(AbstractDiffuse):
             suns = dataclasses.replace(start.suns, rough=rough == 0)
             sweep = dataclasses.replace(start, reference=found[0], suns=suns)
             first = sweep.first(once)
-            bright = _brightness(scene, suns.zenith, first)
+            steepest = start.up[:, self.grounded - 1]
+            bright = _brightness(scene, suns.zenith, steepest, first)
             reference = jnp.where(suns.rough, bright, found[0])
             return jax.lax.stop_gradient(reference), first
 
@@ -154,12 +155,18 @@ _EVEN = 4.5
 # ends at twice that, and other light does not: relative to what is so much darker than
 # itself it could not be joined by cubics.
 _STEEPEST, _SINKS = 1.2, 8.0
+# And from one level to the next, beside what lies between them takes.
+_FADES = 1.0
 
 
 def _brightness(
-    scene: Scene, suns: RoundSuns, light: Light
+    scene: Scene, suns: RoundSuns, depth: Float[Array, "layer wl"], light: Light
 ) -> Float[Array, "level sun"]:
-    """The logarithm of how bright light is, at all wavelengths taken together."""
+    """The logarithm of how bright light is, at all wavelengths taken together.
+
+    Nowhere much less than at the levels next to it, from which light comes through the
+    optical depth between them: what rounding leaves of none by night is no measure.
+    """
     mean = light.moments[:, 0]
     least = float(jnp.finfo(mean.dtype).tiny) ** 0.5
     found = jnp.log(jnp.maximum(mean, least))
@@ -172,4 +179,9 @@ def _brightness(
         return here, here
 
     _, rest = jax.lax.scan(follow, found[:, 0], (found[:, 1:].T, falls))
-    return jnp.concatenate([found[:, :1], rest.T], 1)
+    found = jnp.concatenate([found[:, :1], rest.T], 1)
+    fades = _FADES + 2.0 * jnp.mean(depth, -1)
+    _, down = jax.lax.scan(follow, found[-1], (found[:-1], fades), reverse=True)
+    found = jnp.concatenate([down, found[-1:]])
+    _, up = jax.lax.scan(follow, found[0], (found[1:], fades))
+    return jnp.concatenate([found[:1], up])
