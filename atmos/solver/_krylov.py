@@ -25,7 +25,8 @@ def fixed_point(
     `carry` must not mix. Found in no more than `most` steps, by generalised conjugate
     residuals without the oldest directions (Orthomin; Eisenstat, Elman and Schultz
     1983, SIAM Journal on Numerical Analysis 20(2)). Differentiable at no more than the
-    price of another solution. Where `first` has what is not a number, all is not one.
+    price of another solution. Of a wavelength at which `first` holds what is not a
+    number nothing is a number.
     """
     less = lambda x: jax.tree.map(operator.sub, x, carry(x))
     solve = lambda apply, b: _conjugate_residuals(apply, b, tolerance, most)

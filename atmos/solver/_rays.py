@@ -32,7 +32,7 @@ class Rays(eqx.Module):
     the limb, each turns round in the middle of one layer, the lowest first. `ahead` is
     the distance from a line's lowest place to each level; 0 where it never gets there.
     At each level `weight` adds up integrals over the cosine of the zenith angle from 0
-    to 1.
+    to 1, of what is seen upwards and downwards together.
     """
 
     altitude: Float[Array, "level"]
