@@ -31,14 +31,17 @@ class Rays(eqx.Module):
     The first lines meet the ground, at Gauss's and Legendre's cosines; of the others,
     the limb, each turns round in the middle of one layer, the lowest first. `ahead` is
     the distance from a line's lowest place to each level; 0 where it never gets there.
-    At each level `weight` adds up integrals over the cosine of the zenith angle from 0
-    to 1, of what is seen upwards and downwards together.
+    Half way from level to level a line is lower than the layer's middle, by a share
+    `skew` of the layer, as it is flatter where it is lower. At each level `weight` adds
+    up integrals over the cosine of the zenith angle from 0 to 1, of what is seen
+    upwards and downwards together.
     """
 
     altitude: Float[Array, "level"]
     ahead: Float[Array, "level ray"]
     cosine: Float[Array, "level ray"]
     weight: Float[Array, "level ray"]
+    skew: Float[Array, "layer ray"]
     up: Steps  # from the lower level to the upper one
     down: Steps  # from the upper level to the lower one, or through the lowest place
     grounded: int = eqx.field(static=True)
@@ -68,7 +71,8 @@ def rays(scene: Scene, cut: Layers, grounded: int) -> Rays:
     begin, end = ahead[:-1], ahead[1:]
     chord = (h[1:] - h[:-1]) * (h[1:] + h[:-1] + 2.0 * radius)
     passes = begin > 0.0
-    straight = jnp.where(passes, chord / jnp.where(passes, begin + end, 1.0), 0.0)
+    over = jnp.where(passes, 1.0 / jnp.where(passes, begin + end, 1.0), 0.0)
+    straight = chord * over
     turns = np.eye(layers, grounded + layers, grounded, dtype=bool)
     through = jnp.where(turns, 2.0 * end, straight)
     return Rays(
@@ -76,6 +80,7 @@ def rays(scene: Scene, cut: Layers, grounded: int) -> Rays:
         ahead,
         cosine,
         jnp.concatenate([inner, _limb(cosine[:, grounded:], horizon)], 1),
+        0.25 * straight * over,
         _steps(scene, altitude[1:], end, nearest, straight),
         _steps(scene, altitude[1:], end, nearest, through),
         grounded,

@@ -13,6 +13,10 @@ from ..light import Sun
 from ..quantity import Angle, deg, Direction, dot
 
 
+# The distance from a zenith angle within which others lie evenly.
+_CLOSE = 6.0 * deg
+
+
 class AbstractSuns(eqx.Module):
     """The zenith angles of the sun for which the light is known."""
 
@@ -81,30 +85,28 @@ class EverySun(AbstractSuns):
         return first.astype(jnp.int32), weights
 
 
-# The distance from a light's zenith angle within which others lie evenly.
-_CLOSE = 6.0 * deg
-
-
 class RoundSuns(AbstractSuns):
     """In a round world a light stands otherwise elsewhere, by a little nearby.
 
     For each light `count` zenith angles, from 0 to the `last` at which any air is lit,
-    that crowd around the light's own, joined by cubics.
+    that crowd around the light's own, where those within `close` lie evenly; joined by
+    cubics.
     """
 
     lights: Float[Array, "light"]
     last: Angle
     count: int = eqx.field(static=True)
+    close: Angle | float = _CLOSE
 
     def _ends(self) -> tuple[Array, Array, Array]:
         centre = jnp.clip(self.lights, 0.0, self.last)
-        lowest = jnp.arcsinh(-centre / _CLOSE)
-        return centre, lowest, jnp.arcsinh((self.last - centre) / _CLOSE)
+        lowest = jnp.arcsinh(-centre / self.close)
+        return centre, lowest, jnp.arcsinh((self.last - centre) / self.close)
 
     def zeniths(self) -> Float[Array, "sun"]:
         centre, low, high = (x[:, None] for x in self._ends())
         t = jnp.linspace(0.0, 1.0, self.count, dtype=self.last.dtype)[None]
-        found = centre + _CLOSE * jnp.sinh(low + (high - low) * t)
+        found = centre + self.close * jnp.sinh(low + (high - low) * t)
         return jnp.clip(found, 0.0, self.last).ravel()
 
     def between(
@@ -118,7 +120,7 @@ class RoundSuns(AbstractSuns):
     ) -> tuple[Int[Array, "*n"], Float[Array, "*n"]]:
         """The first of the four to mix, and how many steps from it a light stands."""
         centre, low, high = (x[which] for x in self._ends())
-        t = jnp.arcsinh((jnp.clip(zenith, 0.0, self.last) - centre) / _CLOSE)
+        t = jnp.arcsinh((jnp.clip(zenith, 0.0, self.last) - centre) / self.close)
         t = (t - low) / (high - low) * (self.count - 1)
         first = jnp.clip(jnp.floor(stop_gradient(t)) - 1.0, 0.0, self.count - 4.0)
         return first.astype(jnp.int32) + which * self.count, t - first

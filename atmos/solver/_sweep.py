@@ -87,10 +87,13 @@ class Sweep(eqx.Module):
             if known is not None:
                 moments, bent = known
                 above = self._basis(rays.cosine[i + 1])[0]
+                near = _source(here, turned, moments[i])
+                other = _source(here, turned, moments[i + 1])
+                middle = _source(here, turned, bent[i])
                 sources = (
                     _source(above, turned, moments[i + 1]),
-                    _source(here, turned, moments[i]),
-                    _source(here, turned, bent[i]),
+                    near,
+                    _midst(near, other, middle, rays.skew[i], ends - begins),
                 )
             light = step(self.suns, angle, depth, begins, ends).carry(light, sources)
             if once is not None:
@@ -142,11 +145,11 @@ class Sweep(eqx.Module):
                 half = jnp.exp(0.5 * (begins[0] - ends[0]))[None, :, None]
                 midst = half * (0.5 * (moments[i] + moments[i + 1]) + bent[i])
                 lower = _source(one(here), turned, midst - moments[i + 1])
-                sources = (
-                    swap(far, turn[:, 0]),
-                    _source(here, turned, moments[i + 1]),
-                    swap(_source(here, turned, bent[i]), lower[:, 0]),
-                )
+                near = _source(here, turned, moments[i + 1])
+                other = _source(here, turned, moments[i])
+                middle = _source(here, turned, bent[i])
+                middle = _midst(near, other, middle, -rays.skew[i], ends - begins)
+                sources = swap(far, turn[:, 0]), near, swap(middle, lower[:, 0])
             begins = jnp.where(which[0, :, :, 0, 0], ends, begins)
             steps = step(self.suns, angle, depth, begins, ends)
             light = steps.carry(swap(light, kept), sources)
@@ -236,3 +239,24 @@ def _source(
         more = beta * t[: len(l)] + alpha2 * e, alpha3 * b
         rows = jnp.concatenate([rows.at[: len(l)].add(beta * e), *more])
     return contract("vkap,psw->vkasw", basis, rows)
+
+
+def _midst(
+    near: Float[Array, "stokes ray azimuth sun wl"],
+    other: Float[Array, "stokes ray azimuth sun wl"],
+    middle: Float[Array, "stokes ray azimuth sun wl"],
+    skew: Float[Array, "ray"],
+    rises: Float[Array, "ray sun"],
+) -> Float[Array, "stokes ray azimuth sun wl"]:
+    """What sources half way along steps are more than the mean of those at both ends.
+
+    From those straight above each other, at the `near` end, at the `other` level and
+    in the `middle` of the layer, of which the last is told as what it is more. Half way
+    is closer to the near end by a share `skew` of the layer; the logarithm of the
+    reference `rises` from the other level to the near one.
+    """
+    scale = jnp.exp(skew[:, None] * rises)[None, :, None, :, None]
+    skew = skew[None, :, None, None, None]
+    there = (0.5 + skew) * near + (0.5 - skew) * other
+    there += (1.0 - 4.0 * skew * skew) * middle
+    return scale * there - 0.5 * (near + other)

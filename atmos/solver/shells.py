@@ -121,10 +121,10 @@ class Shells(AbstractDiffuse):
         """How light is carried, for a reference that is everywhere 1."""
         cut = layers(scene, mixed.extinction, self.layers, _EVEN)
         lines = rays(scene, cut, self.grounded)
-        # Suns crowd where they set for the air, and there is night up to the nadir.
         dip = scene.geometry.dip(scene.top, jnp.zeros_like(scene.top))
-        centre = 0.5 * math.pi + 0.3 * dip
-        zenith = RoundSuns(centre[None], jnp.full_like(dip, math.pi), self.suns)
+        beyond = lambda dips: jnp.minimum(0.5 * math.pi + dips * dip, math.pi)
+        crowd = beyond(_SETS)[None], beyond(_DARK), self.suns, _CLOSE * dip
+        zenith = RoundSuns(*crowd)
         suns = Suns(zenith, jnp.zeros((), bool), self.azimuths)
         within = lambda x: contract("km,m...->k...", cut.column, x)
         depth = within(mixed.extinction)[:, None]
@@ -150,6 +150,9 @@ class Shells(AbstractDiffuse):
 
 # Each layer has a line that turns round in it: so there are some where air is thin too.
 _EVEN = 4.5
+# Suns crowd where they set for the air, and end where it is night: by how far below the
+# level they stand, of how far the top of the air sees below it.
+_SETS, _CLOSE, _DARK = 0.7, 0.5, 3.5
 # What the logarithm of brightness at most loses from one sun to the next, and while the
 # sun sinks by as much as the top of the air sees below level. Light that turned once
 # ends at twice that, and other light does not: relative to what is so much darker than
