@@ -22,7 +22,7 @@ from .scene import Scene
 from .solver import AbstractSolver, admit, SolvedSky
 
 
-KIND = archive.Kind("bake", 2, "sky")
+KIND = archive.Kind("bake", 3, "sky")
 
 
 def save(sky: SolvedSky, path: str | os.PathLike[str]) -> None:
