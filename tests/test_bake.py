@@ -223,7 +223,7 @@ def test_any_numpy_reads_the_file_and_finds_what_it_says(kept):
         header = json.loads(arrays["header"].tobytes())
         found = arrays["prepared.field.up"]
         np.testing.assert_array_equal(found, kept[0].prepared.field.up)
-    assert (header["format"], header["version"]) == ("atmos bake", 2)
+    assert (header["format"], header["version"]) == ("atmos bake", 3)
     assert header["made"]["scene.media[0].profile.top"] == "float64[] 1000.0"
     assert header["made"]["wavelength"] == "float64[3] [450.0, 550.0, 650.0]"
     with zipfile.ZipFile(kept[1]) as archive:
