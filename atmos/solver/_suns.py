@@ -88,7 +88,7 @@ class EverySun(AbstractSuns):
 class RoundSuns(AbstractSuns):
     """In a round world a light stands otherwise elsewhere, by a little nearby.
 
-    For each light `count` zenith angles, from 0 to the `last` at which any air is lit,
+    For each light `count` zenith angles, from 0 to the `last` at which there is light,
     that crowd around the light's own, where those within `close` lie evenly; joined by
     cubics.
     """

@@ -34,14 +34,14 @@ class Shells(AbstractDiffuse):
     Light is carried along straight lines from one of `layers` shells of air to the
     next, a line that turns round within each and `grounded` lines that meet the ground,
     in `azimuths` azimuths from the sun's; where the planet's shadow begins and ends is
-    exact. What scatters is kept by shell, in spherical harmonics of degrees
-    below `degrees`, for `suns` zenith angles of the sun, relative to how bright it is
-    there: it serves every sun and every place. Orders are added up by solving for their
-    sum, until it is right to `tolerance`; a solution that is not after `orders` steps
-    is refused. Phase functions are without their forward peaks (delta-M,
-    Wiscombe 1977), but for light that turned once, which is added with them (Nakajima
-    and Tanaka 1988), and what peaks alone turned more than once. A line of sight takes
-    `nodes` places in each of `pieces` pieces.
+    exact. What scatters is kept by shell, in spherical harmonics of degrees below
+    `degrees`, for `suns` zenith angles of the sun from the zenith on into the night,
+    relative to how bright it is there: it serves every sun and every place. Orders are
+    added up by solving for their sum, until it is right to `tolerance`; a solution that
+    is not after `orders` steps is refused. Phase functions are without their forward
+    peaks (delta-M, Wiscombe 1977), but for light that turned once, which is added with
+    them (Nakajima and Tanaka 1988), and what peaks alone turned more than once. A line
+    of sight takes `nodes` places in each of `pieces` pieces.
 
     Raises `ValueError` for a flat world, where a medium does not depend on altitude
     alone, where media have more edges than there are layers, and where `tolerance` is
