@@ -40,6 +40,7 @@ PARTS = {
     "single_scattering": Part("Light that turned once"),
     "columns": Part("Discrete ordinates in flat columns", True, True),
     "orders": Part("All orders in the round", True, traced=True),
+    "fineness": Part("Finer shells", True),
     "derivatives": Part("Slopes of radiance", True),
     "multiple_scattering": Part(
         "Path tracing itself", True, True, more=("--slabs", "250")
