@@ -16,12 +16,21 @@ import pytest
 
 from atmos import archive, bake
 from atmos.cli import main
-from atmos.geometry import Flat
+from atmos.geometry import Flat, Spherical
 from atmos.light import Sun
 from atmos.medium import Medium, Uniform
 from atmos.phase import Rayleigh
 from atmos.scene import Scene
-from atmos.solver import PathTracing, Shared, SingleScattering, solve
+from atmos.solver import (
+    admit,
+    Bruneton,
+    Columns,
+    PathTracing,
+    Shared,
+    Shells,
+    SingleScattering,
+    solve,
+)
 from atmos.spectrum import Constant
 
 
@@ -51,6 +60,14 @@ def copy(kept, tmp_path):
 @eqx.filter_jit
 def look(sky):
     return sky.radiance(jnp.zeros(3), jnp.array([0.0, 0.6, 0.8]))
+
+
+@pytest.mark.parametrize("solver", [Bruneton(), Columns(), Shells(), Shared()])
+def test_what_is_worked_out_for_round_worlds_is_arrays(solver):
+    round = dataclasses.replace(slab(), geometry=Spherical(6.4e6))
+    scene, solver, nm = admit(round, solver, NM)
+    found = eqx.filter_eval_shape(solver.prepare, solver.baked(scene), nm)
+    assert all(isinstance(x, jax.ShapeDtypeStruct) for x in jax.tree.leaves(found))
 
 
 def test_a_sky_from_a_file_is_the_same_to_the_last_bit(kept):

@@ -14,7 +14,7 @@ from ..quantity import Angle, deg, Direction, dot
 
 
 # The distance from a zenith angle within which others lie evenly.
-_CLOSE = 6.0 * deg
+CLOSE = 6.0 * deg
 
 
 class AbstractSuns(eqx.Module):
@@ -65,20 +65,20 @@ class EverySun(AbstractSuns):
     count: int = eqx.field(static=True)
 
     def _ends(self) -> tuple[float, Array]:
-        high = jnp.arcsinh((self.last - 0.5 * math.pi) / _CLOSE)
-        return math.asinh(-0.5 * math.pi / _CLOSE), high
+        high = jnp.arcsinh((self.last - 0.5 * math.pi) / CLOSE)
+        return math.asinh(-0.5 * math.pi / CLOSE), high
 
     def zeniths(self) -> Float[Array, "sun"]:
         low, high = self._ends()
         t = jnp.linspace(0.0, 1.0, self.count, dtype=self.last.dtype)
-        found = 0.5 * math.pi + _CLOSE * jnp.sinh(low + (high - low) * t)
+        found = 0.5 * math.pi + CLOSE * jnp.sinh(low + (high - low) * t)
         return jnp.clip(found, 0.0, self.last)
 
     def between(
         self, light: Sun, zenith: Float[Array, "*n"]
     ) -> tuple[Int[Array, "*n"], Float[Array, "*n 2"]]:
         low, high = self._ends()
-        t = jnp.arcsinh((jnp.minimum(zenith, self.last) - 0.5 * math.pi) / _CLOSE)
+        t = jnp.arcsinh((jnp.minimum(zenith, self.last) - 0.5 * math.pi) / CLOSE)
         t = jnp.clip((t - low) / (high - low), 0.0, 1.0) * (self.count - 1)
         first = jnp.clip(jnp.floor(stop_gradient(t)), 0.0, self.count - 2.0)
         weights = jnp.stack([1.0 - (t - first), t - first], -1)
@@ -95,8 +95,8 @@ class RoundSuns(AbstractSuns):
 
     lights: Float[Array, "light"]
     last: Angle
+    close: Angle
     count: int = eqx.field(static=True)
-    close: Angle | float = _CLOSE
 
     def _ends(self) -> tuple[Array, Array, Array]:
         centre = jnp.clip(self.lights, 0.0, self.last)

@@ -16,7 +16,7 @@ from ._lines import lines
 from ._orders import Orders, stands
 from ._peaks import Peaks
 from ._slants import horizons
-from ._suns import RoundSuns
+from ._suns import CLOSE, RoundSuns
 from ._tables import relative, Tables
 from ._views import Views
 from .single_scattering import SingleScattering
@@ -88,7 +88,8 @@ class Bruneton(AbstractDiffuse):
         cut = layers(scene, mixed.extinction, self.layers)
         dip = scene.geometry.dip(scene.top, jnp.zeros_like(scene.top))
         centre = 0.5 * math.pi + 0.3 * dip
-        suns = RoundSuns(centre[None], jnp.full_like(dip, math.pi), self.suns)
+        crowd = jnp.full_like(dip, math.pi), jnp.full_like(dip, CLOSE)
+        suns = RoundSuns(centre[None], *crowd, self.suns)
         views = Views(self.views, self.azimuths)
         horizon = horizons(scene, cut.altitude)
         horizon = horizon, cut.altitude / scene.top

@@ -20,7 +20,7 @@ from ._interpolated import Glow, Interpolated
 from ._ordinates import solve_column
 from ._peaks import Peaks
 from ._stack import Stack
-from ._suns import AbstractSuns, FlatSuns, RoundSuns
+from ._suns import AbstractSuns, CLOSE, FlatSuns, RoundSuns
 from .single_scattering import SingleScattering
 
 
@@ -184,7 +184,7 @@ class Columns(AbstractDiffuse):
         if isinstance(scene.geometry, Flat):
             return FlatSuns(lights)
         last = 0.5 * jnp.pi + scene.geometry.dip(scene.top, jnp.zeros_like(scene.top))
-        return RoundSuns(lights, last, self.suns)
+        return RoundSuns(lights, last, jnp.full_like(last, CLOSE), self.suns)
 
 
 @eqx.filter_jit

@@ -123,8 +123,8 @@ class Shells(AbstractDiffuse):
         lines = rays(scene, cut, self.grounded)
         dip = scene.geometry.dip(scene.top, jnp.zeros_like(scene.top))
         beyond = lambda dips: jnp.minimum(0.5 * math.pi + dips * dip, math.pi)
-        crowd = beyond(_SETS)[None], beyond(_DARK), self.suns, _CLOSE * dip
-        zenith = RoundSuns(*crowd)
+        crowd = beyond(_SETS)[None], beyond(_DARK), _CLOSE * dip
+        zenith = RoundSuns(*crowd, self.suns)
         suns = Suns(zenith, jnp.zeros((), bool), self.azimuths)
         within = lambda x: contract("km,m...->k...", cut.column, x)
         depth = within(mixed.extinction)[:, None]
