@@ -22,7 +22,7 @@ from ._towards import Travel, travel, turned, waves
 
 
 # So many suns at most are mixed at a place, or so many, or all.
-_FEW, _MORE = 12, 36
+_FEW, _MORE = 6, 24
 
 
 class Ground(eqx.Module):

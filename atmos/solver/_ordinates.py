@@ -103,6 +103,10 @@ def _solve(
     sides = made.alike.T[None, None]
     lit = beam * constant(sides), beam * constant(~sides)
     into = lambda a, b: jnp.einsum("...l,lw->...w", a, b, precision="highest")
+    # Orders and wavelengths as one axis, as processors are quick along long ones.
+    both = len(made.orders), depth.shape[1]
+    joined = lambda x: x.reshape(*x.shape[:-2], -1)
+    apart = lambda x: x.reshape(*x.shape[:-1], *both)
 
     fall = jnp.diff(slant, axis=0)
     doublings = _doublings(depth / float(made.cosine[0]), fall)
@@ -113,10 +117,11 @@ def _solve(
         depth, scattering, top, fall, doublings = layer
         small = jnp.exp2(-doublings.astype(depth.dtype))
         thin = along * (small * depth)[None, None, None]
-        b, a = (thin - into(x, small * scattering) for x in turn)
+        b, a = (joined(thin - into(x, small * scattering)) for x in turn)
         arrives = small * jnp.exp(-top)[None, :, None]
-        p, q = (into(x, scattering) * arrives for x in lit)
-        y, z, p, r = respond(a, b, p, q, (small * fall)[None, :, None], doublings)
+        p, q = (joined(into(x, scattering) * arrives) for x in lit)
+        fall = jnp.broadcast_to((small * fall)[:, None], (len(fall), *both))
+        y, z, p, r = respond(a, b, p, q, joined(fall)[None], doublings)
         solved = inverse_of(identity(y) + product(z, y - 2.0 * stack))
         on = product(solved, identity(y) - product(z, y))
         start = product(solved, product(z, 2.0 * light - p) + r)
@@ -133,14 +138,15 @@ def _solve(
     intensity = np.arange(len(scale)) < made.nodes
     c = constant(np.where(intensity, np.sqrt(made.weight * made.cosine), 0.0))
     ground = _ground(c, constant(made.orders == 0), jnp.zeros_like(slant[0]))
+    below = joined(ground[0]), joined(ground[1])
     (stack, light), layers = jax.lax.scan(
-        up, ground, (depth, scattering, slant[:-1], fall, doublings), reverse=True
+        up, below, (depth, scattering, slant[:-1], fall, doublings), reverse=True
     )
     # At the top nothing comes down: s = d.
     top = product(inverse_of(identity(stack) - stack), light)
     _, (sums, differences) = jax.lax.scan(down, top, layers)
-    sums = jnp.concatenate([top[None], sums])
-    differences = jnp.concatenate([top[None], differences])
+    sums = apart(jnp.concatenate([top[None], sums]))
+    differences = apart(jnp.concatenate([top[None], differences]))
 
     weigh = lambda kind, x: jnp.einsum(
         "tmi,kismw->ksmtw",
