@@ -34,14 +34,22 @@ class Suns(eqx.Module):
     def seen_from(self, angle: Float[Array, "ray"]) -> "Elsewhere":
         """Where they stand so far ahead, by the angle between the verticals."""
         zenith, azimuth = self.zenith.zeniths(), self.azimuth()[None, :, None]
-        sine, cosine = jnp.sin(zenith)[None, None], jnp.cos(zenith)[None, None]
+        sine = jnp.abs(jnp.sin(zenith))[None, None]  # not negative for a rounded pi
+        cosine = jnp.cos(zenith)[None, None]
         s, c = jnp.sin(angle)[:, None, None], jnp.cos(angle)[:, None, None]
         ahead = sine * jnp.cos(azimuth)
         x, z = ahead * c - cosine * s, cosine * c + ahead * s
         # Rounding must not put it on the other side of straight up or down.
         y = jnp.abs(sine * jnp.sin(azimuth) * jnp.ones_like(c)) + _SLIVER
         level = jnp.sqrt(x * x + y * y)
-        sun, step = self.zenith.place(jnp.arctan2(level, z))
+        # How much lower, by what is small itself: light fades so fast by night that
+        # single precision does not tell two zenith angles well enough apart.
+        higher = ahead * s - 2.0 * cosine * jnp.sin(0.5 * angle)[:, None, None] ** 2
+        longer = s * (s * (cosine * cosine - ahead * ahead) - 2.0 * ahead * cosine * c)
+        longer = longer / (level + sine)
+        lower = longer * cosine - higher * sine
+        lower = jnp.arctan2(lower, cosine * z + sine * level)
+        sun, step = self.zenith.place_lower(lower)
         return Elsewhere(sun, self._weights(step), *self._between(jnp.arctan2(y, x)))
 
     def _weights(self, step: Float[Array, "*n"]) -> Float[Array, "*n 4"]:

@@ -122,8 +122,32 @@ class RoundSuns(AbstractSuns):
         centre, low, high = (x[which] for x in self._ends())
         t = jnp.arcsinh((jnp.clip(zenith, 0.0, self.last) - centre) / self.close)
         t = (t - low) / (high - low) * (self.count - 1)
-        first = jnp.clip(jnp.floor(stop_gradient(t)) - 1.0, 0.0, self.count - 4.0)
+        first = self._first(t)
         return first.astype(jnp.int32) + which * self.count, t - first
+
+    def place_lower(
+        self, angle: Float[Array, "*n sun"]
+    ) -> tuple[Int[Array, "*n sun"], Float[Array, "*n sun"]]:
+        """The same where the suns of the first light stand lower by an angle than here.
+
+        Exact for small ones, of which the difference of two zenith angles is not.
+        """
+        _, low, high = (x[0] for x in self._ends())
+        each = jnp.arange(self.count, dtype=angle.dtype)
+        each = jnp.broadcast_to(each, angle.shape)
+        here = jnp.sinh(low + (high - low) / (self.count - 1) * each)
+        moves = angle / self.close
+        there = here + moves
+        # By the sum of the areas of both, of which `moves` is the difference of sines.
+        root = jnp.sqrt(1.0 + here * here) * jnp.sqrt(1.0 + there * there)
+        step = 2.0 * jnp.arcsinh(moves / jnp.sqrt(2.0 * (1.0 + root + here * there)))
+        step = step / (high - low) * (self.count - 1)
+        first = self._first(each + step)
+        x = jnp.clip(each - first + step, -first, self.count - 1.0 - first)
+        return first.astype(jnp.int32), x
+
+    def _first(self, t: Float[Array, "*n"]) -> Float[Array, "*n"]:
+        return jnp.clip(jnp.floor(stop_gradient(t)) - 1.0, 0.0, self.count - 4.0)
 
 
 def cubic(x: Float[Array, "*n"]) -> Float[Array, "*n 4"]:
