@@ -103,16 +103,19 @@ class Elsewhere(eqx.Module):
         self, light: Float[Array, "ray azimuth sun wl"]
     ) -> Float[Array, "ray azimuth sun wl"]:
         suns = light.shape[2]
+        pick = lambda x, i: jax.lax.dynamic_index_in_dim(x, i, -1, False)
 
         def along(light, there):
             rows = light.reshape(-1, light.shape[-1])
-            total = jnp.zeros_like(light)
-            for a in range(4):
-                row = there.azimuth[..., a] * suns + there.sun
-                for s in range(4):
-                    weight = there.by_azimuth[..., a] * there.by_sun[..., s]
-                    total += weight[..., None] * rows[row + s]
-            return total
+
+            # In a loop: unrolled it takes longer, and much longer to compile.
+            def add(i, total):
+                a, s = i // 4, i % 4
+                row = pick(there.azimuth, a) * suns + there.sun + s
+                weight = pick(there.by_azimuth, a) * pick(there.by_sun, s)
+                return total + weight[..., None] * rows[row]
+
+            return jax.lax.fori_loop(0, 16, add, jnp.zeros_like(light))
 
         return jax.vmap(along)(light, self)
 
