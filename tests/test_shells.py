@@ -21,6 +21,7 @@ from atmos.scene import Scene
 from atmos.solver import Columns, Shells, SingleScattering, solve
 from atmos.solver._krylov import fixed_point
 from atmos.solver._rays import rays
+from atmos.solver._suns import RoundSuns
 from atmos.solver.shells import _EVEN
 
 
@@ -130,6 +131,16 @@ def test_single_precision_agrees_with_double(seen):
     off = np.abs(looks(scene, SHELLS, DUSK, views, eye) / seen - 1.0)
     assert np.max(off[:9]) < 2e-5
     assert np.max(off) < 6e-5
+
+
+def test_suns_that_stand_lower_are_where_their_zenith_angle_is():
+    suns = RoundSuns(jnp.array([1.69]), jnp.array(1.95), jnp.array(0.07), 48)
+    lower = jnp.array([-3.0, -0.3, -1e-3, 0.0, 1e-6, 0.02, 0.2, 3.0])[:, None]
+    lower = jnp.broadcast_to(lower, (8, 48))
+    first, x = map(np.asarray, suns.place(suns.zeniths()[None] + lower))
+    other, y = map(np.asarray, suns.place_lower(lower))
+    np.testing.assert_allclose(other + y, first + x, atol=1e-9)
+    assert np.all((y >= 0.0) & (y <= 3.0))
 
 
 @pytest.mark.usefixtures("hasty")
