@@ -128,9 +128,9 @@ class RoundSuns(AbstractSuns):
     def place_lower(
         self, angle: Float[Array, "*n sun"]
     ) -> tuple[Int[Array, "*n sun"], Float[Array, "*n sun"]]:
-        """The same where the suns of the first light stand lower by an angle than here.
+        """The same for the suns of the first light, each lower by so much than it is.
 
-        Exact for small ones, of which the difference of two zenith angles is not.
+        Exact where that is small, which the difference of two zenith angles is not.
         """
         _, low, high = (x[0] for x in self._ends())
         each = jnp.arange(self.count, dtype=angle.dtype)
@@ -138,9 +138,10 @@ class RoundSuns(AbstractSuns):
         here = jnp.sinh(low + (high - low) / (self.count - 1) * each)
         moves = angle / self.close
         there = here + moves
-        # By the sum of the areas of both, of which `moves` is the difference of sines.
-        root = jnp.sqrt(1.0 + here * here) * jnp.sqrt(1.0 + there * there)
-        step = 2.0 * jnp.arcsinh(moves / jnp.sqrt(2.0 * (1.0 + root + here * there)))
+        # sinh a - sinh b = 2 sinh((a - b) / 2) cosh((a + b) / 2)
+        even = jnp.sqrt((1.0 + here * here) * (1.0 + there * there))
+        twice = jnp.sqrt(2.0 * (1.0 + even + here * there))
+        step = 2.0 * jnp.arcsinh(moves / twice)
         step = step / (high - low) * (self.count - 1)
         first = self._first(each + step)
         x = jnp.clip(each - first + step, -first, self.count - 1.0 - first)
