@@ -30,8 +30,6 @@ TOP, RADIUS = 6e4, 6.4e6
 # One set of sizes for all tests, so that they share a compilation.
 SIZES = dict(layers=24, grounded=8, azimuths=6, degrees=6, suns=48)
 SHELLS = Shells(**SIZES)
-# Where a step is no way for the sun, few of them tell the rest.
-FEW = dataclasses.replace(SHELLS, suns=16)
 ONCE = SingleScattering()
 
 
@@ -169,7 +167,8 @@ def test_polarised_light_on_a_huge_planet_is_as_published():
     scene = numbers(depth=0.5, haze=0.0, ground=0.25, radius=1e3 * RADIUS)
     air = dataclasses.replace(scene.media[0], phase=Rayleigh(0.0))
     scene = dataclasses.replace(scene, media=(air,))
-    sky = solve(scene, dataclasses.replace(FEW, stokes=3), NM)
+    # Where a step is no way for the sun, few of them tell the rest.
+    sky = solve(scene, dataclasses.replace(SHELLS, suns=16, stokes=3), NM)
     level, turn = math.sqrt(1.0 - 0.64**2), math.pi / 2.0
     view = np.array([level * math.sin(turn), level * math.cos(turn), 0.64])
     views = np.stack([view, view * [1, 1, -1]])
